@@ -1,0 +1,84 @@
+"""The exceptions that flexspine raises.
+
+    FlexspineError
+    ├── InputError              what the caller gave cannot be used        exit code 2
+    │   ├── UnknownNameError    no such preset, parameter, model, option
+    │   ├── ParameterError      a value of the wrong type or out of bounds
+    │   ├── PresetError         a preset file that cannot be read
+    │   ├── StateError          an initial state that cannot be simulated
+    │   └── OutputError         a place that results cannot be written to
+    └── EnvironmentFailure      the machine failed: disk, worker, missing extra   exit code 3
+
+A run that merely ends badly (it fell) raises nothing: that is an `Outcome`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import ClassVar
+
+
+class FlexspineError(Exception):
+    """An error with what went wrong and what to do about it, in one line each."""
+
+    code: ClassVar[str] = "error"
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, message: str, remedy: str) -> None:
+        super().__init__(message, remedy)
+        self.message = message
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.message}; {self.remedy}"
+
+
+class InputError(FlexspineError):
+    """The caller's input cannot be used."""
+
+    code = "bad_input"
+    exit_code = 2
+
+
+class UnknownNameError(InputError):
+    """A name that is not in a known list."""
+
+    code = "unknown_name"
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        choices = sorted(known)
+        close = get_close_matches(name, choices, n=1, cutoff=0.5)
+        remedy = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(choices)}"
+        super().__init__(f"unknown {kind} '{name}'", remedy)
+
+
+class ParameterError(InputError):
+    """A parameter value of the wrong type or outside its bounds."""
+
+    code = "bad_parameter"
+
+
+class PresetError(InputError):
+    """A preset file that is missing or malformed."""
+
+    code = "bad_preset"
+
+
+class StateError(InputError):
+    """An initial state from which no run can start."""
+
+    code = "bad_state"
+
+
+class OutputError(InputError):
+    """A place that results cannot be written to."""
+
+    code = "bad_output"
+
+
+class EnvironmentFailure(FlexspineError):
+    """The machine failed: the disk is full, a worker died, an extra is missing."""
+
+    code = "environment"
+    exit_code = 3

@@ -1,0 +1,1 @@
+"""Systems that flow and jump: fields, guards, resets, events; knows nothing of legs."""

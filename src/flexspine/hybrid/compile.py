@@ -1,0 +1,283 @@
+"""Machine code for a hybrid system: one Taylor integrator and one event kernel per mode.
+
+Each mode is compiled when it is first entered, with its own field, so that flight does not pay
+for the legs. The event kernel evaluates, at one state, every guard with its rate and what every
+jump would lead to: the state after it and the guards of the mode it leads into.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import heyoka as hy
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from flexspine.hybrid.cache import mend_cache, open_cache
+from flexspine.hybrid.lowering import Lowering
+from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode
+
+Array = NDArray[np.float64]
+
+
+class Due(NamedTuple):
+    """A guard that may fire at the instant at which its mode is entered.
+
+    ``was_active``: in the mode before, too. ``by_level``: armed by level.
+    """
+
+    index: int
+    name: str
+    was_active: bool
+    by_level: bool
+
+
+@dataclass(frozen=True)
+class Jump:
+    """Where one guard leads, and where the kernel's answer for it stands.
+
+    A guard that does not act is a mere marker, such as a section may use.
+    ``value`` and ``rate`` are the guard itself; ``states`` and ``held`` the point after the jump,
+    ``guards`` the guards of the target mode there, value and rate in turn, of which ``due`` may
+    fire at the same instant.
+    """
+
+    guard: Guard
+    acts: bool
+    target: str
+    value: int
+    rate: int
+    states: slice
+    held: slice
+    guards: slice
+    due: tuple[Due, ...]
+
+
+class CompiledMode:
+    """The machine code of one mode.
+
+    ``state`` and ``numbers`` are the integrator's own memory: its state and its parameters, which
+    are the held variables and then the folded coefficients. ``owner`` is the `BoundMode` whose
+    coefficients stand there now.
+    """
+
+    def __init__(
+        self, mode: Mode, integrator: Any, coefficients: Any, kernel: Any, jumps: tuple[Jump, ...]
+    ) -> None:
+        self.mode = mode
+        self.integrator = integrator
+        self.coefficients = coefficients
+        self.kernel = kernel
+        self.jumps = jumps
+        self.guards = slice(0, 2 * len(jumps))
+        self.due_at_start = _due(mode, mode)
+        self.state: Array = integrator.state
+        self.numbers: Array = integrator.pars
+        self.owner: BoundMode | None = None
+
+    @property
+    def terms(self) -> int:
+        """Elementary operations per Taylor order in the field, guards included."""
+        return len(self.integrator.decomposition) - 2 * self.integrator.dim
+
+
+class CompiledSystem:
+    """A hybrid system with its modes compiled on demand, for one tolerance."""
+
+    def __init__(self, system: HybridSystem, tolerance: float) -> None:
+        self.system = system
+        self.tolerance = tolerance
+        self._modes: dict[str, CompiledMode] = {}
+        self._observables: dict[str, Any] = {}
+        self._states = {
+            symbol: hy.make_vars(f"s{i}") for i, symbol in enumerate(system.states)
+        }
+        self._held = {symbol: hy.par[i] for i, symbol in enumerate(system.held)}
+        first = len(system.held)
+        self._raw = {symbol: hy.par[first + i] for i, symbol in enumerate(system.parameters)}
+        open_cache()
+
+    def mode(self, name: str) -> CompiledMode:
+        """Return the named mode, compiled."""
+        if name not in self._modes:
+            self._modes[name] = self._compile(self.system.mode(name))
+            mend_cache()
+        return self._modes[name]
+
+    def observables(self, name: str) -> tuple[tuple[str, ...], Any]:
+        """Return the names of a mode's observables and the compiled function of them."""
+        if name not in self._observables:
+            mode = self.system.mode(name)
+            lower = self._plain(mode.definitions)
+            function = self._function([lower(expr) for expr in mode.observables.values()])
+            self._observables[name] = (tuple(mode.observables), function)
+        names, function = self._observables[name]
+        return names, function
+
+    def _compile(self, mode: Mode) -> CompiledMode:
+        system = self.system
+        lower = Lowering(
+            {**self._states, **self._held}, system.parameters, mode.definitions, len(system.held)
+        )
+        field = [(self._states[s], lower(mode.field[s])) for s in system.states]
+        events = [
+            hy.t_event(lower(guard.expression), direction=hy.event_direction.negative)
+            for guard in mode.guards
+        ]
+        start = [0.0] * len(system.states)
+        integrator = hy.taylor_adaptive(field, start, tol=self.tolerance, t_events=events)
+        kernel, jumps = self._event_kernel(mode)
+        coefficients = self._coefficients(lower.coefficients)
+        return CompiledMode(mode, integrator, coefficients, kernel, jumps)
+
+    def _coefficients(self, expressions: list[sp.Expr]) -> Any:
+        """Compile the folded expressions as a function of the parameters."""
+        variables = {s: hy.expression(f"p{i}") for i, s in enumerate(self.system.parameters)}
+        lower = Lowering(variables, (), {}, 0)
+        return hy.cfunc([lower(e) for e in expressions], vars=list(variables.values()))
+
+    def _event_kernel(self, mode: Mode) -> tuple[Any, tuple[Jump, ...]]:
+        system = self.system
+        n, m = len(system.states), len(system.held)
+        now = {**self._states, **self._held}
+        lower = self._plain(mode.definitions)
+        outputs = self._guards_and_rates(mode, now)
+        jumps: list[Jump] = []
+        for i, guard in enumerate(mode.guards):
+            target = system.mode(guard.target or mode.name)
+            at = len(outputs)
+            if guard.jumps:
+                after = now | {symbol: lower(value) for symbol, value in guard.resets.items()}
+                outputs += [after[s] for s in (*system.states, *system.held)]
+                outputs += self._guards_and_rates(target, after)
+            jumps.append(
+                Jump(
+                    guard=guard,
+                    acts=guard.jumps or guard.ends is not None,
+                    target=target.name,
+                    value=2 * i,
+                    rate=2 * i + 1,
+                    states=slice(at, at + n),
+                    held=slice(at + n, at + n + m),
+                    guards=slice(at + n + m, len(outputs)),
+                    due=_due(target, mode),
+                )
+            )
+        return self._function(outputs), tuple(jumps)
+
+    def _guards_and_rates(self, mode: Mode, at: Mapping[sp.Symbol, Any]) -> list[Any]:
+        """Each guard's value and its rate along the field, at the given values of the variables."""
+        lower = self._plain(mode.definitions)
+        here = list(self._states.values())
+        field = [lower(mode.field[symbol]) for symbol in self._states]
+        pairs: list[Any] = []
+        for guard in mode.guards:
+            value = lower(guard.expression)
+            slope = hy.sum(
+                [hy.diff(value, s) * f for s, f in zip(here, field, strict=True)]
+            )
+            pairs += [value, slope]
+        moved = {v: at[s] for s, v in (self._states | self._held).items() if at[s] != v}
+        return list(hy.subs(pairs, moved)) if moved else pairs
+
+    def _plain(self, definitions: Mapping[sp.Symbol, sp.Expr]) -> Lowering:
+        """A lowering that folds nothing; kernels are called too seldom to gain from it."""
+        return Lowering({**self._states, **self._held, **self._raw}, (), definitions, 0)
+
+    def _function(self, outputs: list[Any]) -> Any:
+        return hy.cfunc(outputs, vars=list(self._states.values()))
+
+
+def _due(mode: Mode, before: Mode) -> tuple[Due, ...]:
+    active = {guard.name for guard in before.guards}
+    return tuple(
+        Due(i, guard.name, guard.name in active, guard.arming is Arming.LEVEL)
+        for i, guard in enumerate(mode.guards)
+        if guard.jumps or guard.ends
+    )
+
+
+@lru_cache(maxsize=64)
+def compile_system(system: HybridSystem, tolerance: float) -> CompiledSystem:
+    """Return the compiled form of a system, the same object for the same arguments."""
+    return CompiledSystem(system, tolerance)
+
+
+class BoundMode:
+    """A compiled mode with the numbers of one run."""
+
+    __slots__ = ("_answer", "_inputs", "_n_held", "_n_inputs_held", "_numbers", "code")
+
+    def __init__(self, code: CompiledMode, n_held: int, parameters: Array) -> None:
+        self.code = code
+        room = np.zeros(n_held)
+        numbers = np.concatenate([room, code.coefficients(parameters)])
+        self._numbers = numbers[: code.numbers.size]
+        self._inputs = np.concatenate([room, parameters])[: code.kernel.nparams]
+        self._answer = np.empty(code.kernel.nouts)
+        # Code that needs few numbers may not reach as far as all held variables.
+        self._n_held = min(n_held, self._numbers.size)
+        self._n_inputs_held = min(n_held, self._inputs.size)
+
+    def enter(self, time: float, states: Array, held: Array) -> Any:
+        """Return the integrator, set to a point of this mode."""
+        code = self.code
+        if code.owner is not self:
+            code.numbers[:] = self._numbers
+            code.owner = self
+        n = self._n_held
+        code.numbers[:n] = held[:n]
+        code.state[:] = states
+        integrator = code.integrator
+        integrator.time = time
+        integrator.reset_cooldowns()
+        return integrator
+
+    def evaluate(self, states: Array, held: Array) -> Array:
+        """Run the event kernel; the array returned is overwritten by the next call."""
+        n = self._n_inputs_held
+        self._inputs[:n] = held[:n]
+        self.code.kernel(states, outputs=self._answer, pars=self._inputs)
+        return self._answer
+
+    def evaluate_many(self, states: Array, held: Array) -> Array:
+        """Run the event kernel at states of shape (k, n); returns shape (answers, k)."""
+        n = self._n_inputs_held
+        self._inputs[:n] = held[:n]
+        return evaluate_columns(self.code.kernel, states, self._inputs)
+
+
+def evaluate_columns(function: Any, states: Array, parameters: Array) -> Array:
+    """Evaluate a compiled function at states of shape (k, n) with the same parameters."""
+    spread = np.repeat(parameters[: function.nparams, None], len(states), axis=1)
+    result: Array = function(np.ascontiguousarray(states.T), pars=spread)
+    return result
+
+
+class BoundSystem:
+    """A compiled system with parameter values, ready to be integrated.
+
+    ``parameters`` has shape (number of parameters,), in the order of ``system.parameters``.
+    """
+
+    def __init__(self, compiled: CompiledSystem, parameters: Array) -> None:
+        self.compiled = compiled
+        self.system = compiled.system
+        self.parameters = np.asarray(parameters, dtype=float)
+        self._modes: dict[str, BoundMode] = {}
+        held, section = compiled.system.held, compiled.system.section
+        self.section_requires = [(held.index(s), value) for s, value in section.requires.items()]
+        self.section_resets = [(held.index(s), value) for s, value in section.resets.items()]
+
+    def mode(self, name: str) -> BoundMode:
+        """Return the named mode, compiled and bound."""
+        bound = self._modes.get(name)
+        if bound is None:
+            code = self.compiled.mode(name)
+            bound = BoundMode(code, len(self.system.held), self.parameters)
+            self._modes[name] = bound
+        return bound

@@ -1,0 +1,282 @@
+"""One run of a hybrid system, events located by the integrator to rounding error."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from flexspine.hybrid.compile import Array, BoundMode, BoundSystem, Due, Jump
+from flexspine.hybrid.grazing import touches_without_crossing
+from flexspine.hybrid.outcome import (
+    CHATTERED,
+    COMPLETED,
+    DIVERGED,
+    GRAZED,
+    TIMED_OUT,
+    Outcome,
+    OutcomeKind,
+)
+from flexspine.hybrid.trajectory import Arc, Event, HybridState, Trajectory
+
+# s; guards that fire closer together than this are one event.
+SIMULTANEITY = 1e-12
+
+# Guard units; a guard above this is not due now at any rate below 1e6 per second.
+CLOSE = 1e-6
+
+# Guard units; a LEVEL guard this little below zero on entry is zero with rounding error.
+LEVEL_TOLERANCE = 1e-12
+
+# Guard units per second; crossed more slowly, one rounding error of the guard (1e-16) moves the
+# event by more than SIMULTANEITY.
+GRAZING_RATE = 1e-4
+
+# One guard firing this often within this many seconds is chatter; no gait comes near it.
+CHATTER_EVENTS = 8
+CHATTER_WINDOW = 1e-2
+
+# A stride takes some 30 steps; spending this many between two crossings is getting nowhere.
+MAX_STEPS = 50_000
+
+
+def integrate(
+    bound: BoundSystem,
+    start: HybridState,
+    *,
+    end_time: float = inf,
+    crossings: int | None = None,
+    section_timeout: float = 10.0,
+    max_steps: int = MAX_STEPS,
+    record: bool = False,
+) -> Trajectory:
+    """Run until ``end_time`` (s) or until the section was crossed ``crossings`` times.
+
+    With ``crossings``, a run that stays away from the section for ``section_timeout`` seconds
+    ends as the section's ``missed`` outcome. ``max_steps`` bounds the Taylor steps between two
+    crossings. ``record`` keeps dense output. Always returns; the outcome tells how it ended.
+    """
+    run = _Run(bound, start, end_time, crossings, section_timeout, max_steps, record)
+    return run.go()
+
+
+class _Run:
+    """The state of one integration in progress."""
+
+    def __init__(
+        self,
+        bound: BoundSystem,
+        start: HybridState,
+        end_time: float,
+        wanted: int | None,
+        section_timeout: float,
+        max_steps: int,
+        record: bool,
+    ) -> None:
+        self.bound, self.start = bound, start
+        self.advance = self._advance_recording if record else self._advance
+        self.end_time, self.wanted = end_time, wanted
+        self.section_timeout, self.max_steps = section_timeout, max_steps
+        self.section = bound.system.section
+        self.time, self.mode = start.time, start.mode
+        self.states, self.held = start.states, start.held
+        self.events: list[Event] = []
+        self.crossings: list[HybridState] = []
+        self.arcs: list[Arc] = []
+        self.steps, self.steps_left = 0, max_steps
+        # The guards that fired at the latest instant; none of them may fire at it again.
+        self.instant, self.fired = start.time, [self.section.guard]
+        self.limit = self._limit()
+        self.outcome: Outcome | None = None
+
+    def go(self) -> Trajectory:
+        self._settle_start()
+        while self.outcome is None:
+            self._flow()
+        return Trajectory(
+            bound=self.bound,
+            start=self.start,
+            end=self._here(),
+            events=tuple(self.events),
+            crossings=tuple(self.crossings),
+            arcs=tuple(self.arcs),
+            steps=self.steps,
+            outcome=self.outcome,
+        )
+
+    def _here(self) -> HybridState:
+        return HybridState(self.time, self.mode, self.states, self.held)
+
+    def _limit(self) -> float:
+        """How far to go before giving the section up, in s."""
+        if self.wanted is None:
+            return self.end_time
+        return min(self.end_time, self.time + self.section_timeout)
+
+    def _flow(self) -> None:
+        """Follow the field of the present mode until something happens."""
+        mode = self.bound.mode(self.mode)
+        integrator = mode.enter(self.time, self.states, self.held)
+        code, limit = mode.code, self.limit
+        jumps = code.jumps
+        while True:
+            result = self.advance(integrator, limit)
+            if self.outcome is not None:
+                return
+            self.time, self.states = integrator.time, code.state.copy()
+            index = -int(result) - 1
+            if not 0 <= index < len(jumps):
+                self.outcome = self._stopped(result, limit)
+                return
+            if self._happens(jumps[index], mode):
+                return
+
+    def _advance(self, integrator: Any, limit: float) -> Any:
+        result, _, _, steps, _, _ = integrator.propagate_until(limit, max_steps=self.steps_left)
+        self.steps += steps
+        self.steps_left = max(self.steps_left - steps, 1)
+        return result
+
+    def _advance_recording(self, integrator: Any, limit: float) -> Any:
+        """Advance step by step and keep the Taylor series of each."""
+        times, series = [integrator.time], []
+        result = hy.taylor_outcome.success
+        while result == hy.taylor_outcome.success:
+            if self.steps_left == 0:
+                result = hy.taylor_outcome.step_limit
+                break
+            result, step = integrator.step(limit - integrator.time, write_tc=True)
+            self.steps += 1
+            self.steps_left -= 1
+            if step > 0:
+                times.append(integrator.time)
+                series.append(integrator.tc.copy())
+        if series:
+            self._keep(Arc(self.mode, self.held, np.array(times), np.array(series)))
+        return result
+
+    def _keep(self, arc: Arc) -> None:
+        """Keep an arc; if a guard touches zero within it without crossing, end the run there."""
+        touch = touches_without_crossing(arc, self.bound.mode(arc.mode))
+        if touch is not None:
+            name, self.time = touch
+            arc = arc.until(self.time)
+            self.states = arc(np.array([self.time]))[0]
+            self.outcome = Outcome(GRAZED, f"{name} missed by a hair at t = {self.time:.9g} s")
+        self.arcs.append(arc)
+
+    def _stopped(self, result: Any, limit: float) -> Outcome:
+        if result == hy.taylor_outcome.time_limit:
+            if limit == self.end_time:
+                return Outcome(COMPLETED, f"reached t = {self.time:.6g} s")
+            return Outcome(
+                self.section.missed,
+                f"no {self.section.guard} within {self.section_timeout:g} s after "
+                f"{len(self.crossings)} of {self.wanted}, still in {self.mode}",
+            )
+        if result == hy.taylor_outcome.step_limit:
+            return Outcome(
+                TIMED_OUT, f"{self.max_steps} steps in {self.mode} reached only t = {self.time:g} s"
+            )
+        return Outcome(DIVERGED, f"not finite after t = {self.time:.6g} s in {self.mode}")
+
+    def _happens(self, jump: Jump, mode: BoundMode) -> bool:
+        """Let one guard fire; returns whether the flow has to start anew."""
+        guard = jump.guard
+        if self.time - self.instant <= SIMULTANEITY and guard.name in self.fired:
+            return False  # the same root once more; the integrator now cools it down
+        crossed = guard.name == self.section.guard and all(
+            self.held[i] == value for i, value in self.bound.section_requires
+        )
+        if not (crossed or jump.acts):
+            return False
+        self.instant, self.fired = self.time, [guard.name]
+        before = self.mode
+        if jump.acts:
+            values = mode.evaluate(self.states, self.held)
+            if guard.ends is None and (kind := self._doubt(guard.name, values[jump.rate])):
+                self.outcome = Outcome(kind, f"{guard.name} at t = {self.time:.9g} s")
+                return True
+            self._fire(jump, values)
+        if crossed:
+            self._cross()
+        self.events.append(Event(tuple(self.fired), before, self._here()))
+        return True
+
+    def _fire(self, jump: Jump, values: Array) -> None:
+        """Jump, then let every further guard that is due at this instant fire, each once."""
+        while True:
+            if jump.guard.ends is not None:
+                text = f"{jump.guard.name} at t = {self.time:.6g} s"
+                self.outcome = Outcome(jump.guard.ends, text)
+                return
+            self.states = values[jump.states].copy()
+            self.held = values[jump.held].copy()
+            self.mode = jump.target
+            due = self._due(values[jump.guards], jump.due)
+            if due is None:
+                return
+            mode = self.bound.mode(self.mode)
+            values = mode.evaluate(self.states, self.held)
+            jump = mode.code.jumps[due]
+            self.fired.append(jump.guard.name)
+
+    def _due(self, pairs: Array, candidates: tuple[Due, ...]) -> int | None:
+        """Return the index of a guard that fires at this instant too; pairs: value, rate, ..."""
+        numbers = pairs.tolist()
+        for index, name, was_active, by_level in candidates:
+            value = numbers[2 * index]
+            if value > CLOSE:
+                continue
+            rate = numbers[2 * index + 1]
+            falls_now = rate < 0 and value <= -rate * SIMULTANEITY
+            if by_level:
+                fires = falls_now or value < -LEVEL_TOLERANCE
+            else:
+                fires = was_active and falls_now and value >= rate * SIMULTANEITY
+            if fires and name not in self.fired:
+                return index
+        return None
+
+    def _settle_start(self) -> None:
+        """Fire what is due at the very start, where every guard counts as armed."""
+        mode = self.bound.mode(self.mode)
+        values = mode.evaluate(self.states, self.held)
+        numbers = values[mode.code.guards].tolist()
+        for jump in mode.code.jumps:
+            touching = -SIMULTANEITY <= numbers[jump.value] <= SIMULTANEITY
+            if touching and jump.guard.jumps and abs(numbers[jump.rate]) < GRAZING_RATE:
+                self.outcome = Outcome(GRAZED, f"{jump.guard.name} at the start")
+                return
+        due = self._due(values[mode.code.guards], mode.code.due_at_start)
+        if due is not None:
+            jump, before = mode.code.jumps[due], self.mode
+            self.fired = [jump.guard.name]
+            self._fire(jump, values)
+            self.events.append(Event(tuple(self.fired), before, self._here()))
+
+    def _doubt(self, name: str, rate: float) -> OutcomeKind | None:
+        """Tell a grazing or a chattering event from a proper one."""
+        grazing = -GRAZING_RATE < rate < GRAZING_RATE
+        crowded = len(self.events) >= CHATTER_EVENTS and (
+            self.time - self.events[-CHATTER_EVENTS].after.time < CHATTER_WINDOW
+        )
+        if not (grazing or crowded):
+            return None
+        recent = [e for e in self.events[-4 * CHATTER_EVENTS :] if self.time - e.time < CHATTER_WINDOW]
+        before = sum(name in event.names for event in recent)
+        if before >= (CHATTER_EVENTS // 2 if grazing else CHATTER_EVENTS):
+            return CHATTERED
+        return GRAZED if grazing else None
+
+    def _cross(self) -> None:
+        """Note a point of the section."""
+        self.held = self.held.copy()
+        for i, value in self.bound.section_resets:
+            self.held[i] = value
+        self.crossings.append(self._here())
+        self.steps_left, self.limit = self.max_steps, self._limit()
+        if len(self.crossings) == self.wanted:
+            self.outcome = Outcome(COMPLETED, f"{self.wanted} x {self.section.guard}")

@@ -1,0 +1,92 @@
+"""What a hybrid system is: modes with their own field, guards between them, resets, a section.
+
+Expressions are SymPy; `flexspine.hybrid.compile` turns them into machine code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+import sympy as sp
+
+from flexspine.hybrid.outcome import OutcomeKind
+
+class Arming(Enum):
+    """When a guard may fire."""
+
+    CROSSING = "crossing"
+    """By falling through zero. A guard that is below zero waits until it has been above."""
+
+    LEVEL = "level"
+    """As CROSSING, and at once when its mode is entered with the guard below zero."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """An event: it happens when ``expression`` falls through zero.
+
+    ``target`` is the next mode (None: the same), ``resets`` the new values of states and held
+    variables (those not named stay), ``ends`` the outcome if the event ends the run.
+    """
+
+    name: str
+    expression: sp.Expr
+    target: str | None = None
+    resets: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    arming: Arming = Arming.CROSSING
+    ends: OutcomeKind | None = None
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the guard changes the mode or any value."""
+        return self.target is not None or bool(self.resets)
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One continuous regime: the field and the guards that are active in it.
+
+    ``definitions`` are shared subexpressions in order of evaluation, ``field`` gives the rate of
+    every state, ``observables`` further quantities to report.
+    """
+
+    name: str
+    definitions: Mapping[sp.Symbol, sp.Expr]
+    field: Mapping[sp.Symbol, sp.Expr]
+    guards: tuple[Guard, ...]
+    observables: Mapping[str, sp.Expr] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A Poincare section: the firing of ``guard`` while ``requires`` holds.
+
+    ``requires`` are values of held variables, ``resets`` is applied on the section,
+    ``coordinates`` name the states that identify a point of it, ``missed`` is the outcome of a
+    run that never comes back to it.
+    """
+
+    guard: str
+    requires: Mapping[sp.Symbol, float]
+    resets: Mapping[sp.Symbol, float]
+    coordinates: Mapping[str, sp.Symbol]
+    missed: OutcomeKind
+
+
+@dataclass(frozen=True, eq=False)
+class HybridSystem:
+    """A hybrid system.
+
+    ``states`` flow, ``held`` variables change only at events, ``parameters`` not at all during a
+    run. ``mode`` builds the named mode when it is first needed.
+    """
+
+    name: str
+    states: tuple[sp.Symbol, ...]
+    held: tuple[sp.Symbol, ...]
+    parameters: tuple[sp.Symbol, ...]
+    modes: tuple[str, ...]
+    mode: Callable[[str], Mode]
+    section: Section

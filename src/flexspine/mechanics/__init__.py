@@ -1,0 +1,1 @@
+"""From symbols to equations of motion; knows neither events nor legs."""

@@ -1,0 +1,1 @@
+"""The animals, their presets, and how to run them."""

@@ -1,0 +1,189 @@
+"""A bounding quadruped in the sagittal plane: any body, carried by a fore and a hind leg.
+
+Phases: DF (both legs in flight), FS (fore stance), HS (hind stance), DS (both in stance). Every
+order of them can occur. The section is the apex: CoM highest, in flight, after both legs have
+had a stance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import sympy as sp
+
+from flexspine.hybrid.outcome import OutcomeKind
+from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Section
+from flexspine.mechanics.lagrangian import Definitions, Lagrangian
+from flexspine.models.legs import LegSymbols, StanceLeg, SwingLeg, hip_velocity
+from flexspine.parameters import ParameterSet, values
+
+FELL = OutcomeKind(
+    "fell",
+    "start from a gait, choose other touchdown angles, or stabilise; most passive gaits are unstable",
+)
+NO_APEX = OutcomeKind(
+    "no_apex",
+    "the animal never took off again; give it more energy or steeper touchdown angles",
+)
+
+PHASES = ("DF", "FS", "HS", "DS")
+
+X, Y, X_RATE, Y_RATE, DISSIPATED, GRAVITY = sp.symbols("x y xdot ydot E_d g", real=True)
+FORE, HIND = LegSymbols.of("fore"), LegSymbols.of("hind")
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What carries the hips: everything about a model but its legs.
+
+    ``coordinates`` maps public names of the angles to (angle, rate), in rad and rad/s;
+    ``parameters`` maps dotted names to letters; hips and ``low_points`` are in the inertial
+    frame, the latter being what must stay above the ground besides the hips. ``power_lost`` is
+    what the spine's damper takes, in W.
+    """
+
+    coordinates: Mapping[str, tuple[sp.Symbol, sp.Symbol]]
+    parameters: Mapping[str, sp.Symbol]
+    definitions: Definitions
+    kinetic: sp.Expr
+    gravity: sp.Expr
+    hips: Mapping[str, tuple[sp.Expr, sp.Expr]]
+    spine: sp.Expr = sp.S.Zero
+    power_lost: sp.Expr = sp.S.Zero
+    low_points: Mapping[str, sp.Expr] = field(default_factory=dict)
+    observables: Mapping[str, sp.Expr] = field(default_factory=dict)
+
+
+HIP = {side: sp.symbols(f"X_{side[0]} Y_{side[0]}", real=True) for side in ("fore", "hind")}
+
+
+@dataclass(frozen=True)
+class BounderKind:
+    """A kind of bounder: its parameter class and how its body follows from the parameters.
+
+    ``body`` takes whether the spine has a damper, to leave out the terms of one that has not.
+    """
+
+    name: str
+    title: str
+    source: str
+    parameters: type[ParameterSet]
+    body: Callable[[bool], Body]
+
+    def system(self, parameters: ParameterSet) -> HybridSystem:
+        """The hybrid system for these parameters; only what vanishes depends on their values."""
+        given = values(parameters)
+        damped_legs = any(given[f"{side}.leg.damping"] > 0 for side in HIP)
+        damped_spine = given.get("spine.damping", 0.0) > 0
+        return bounder_system(self.name, self.body(damped_spine), damped_legs)
+
+
+def lagrangian(body: Body, stance: tuple[StanceLeg, ...] = ()) -> Lagrangian:
+    """The body's mechanics with the given legs on the ground."""
+    angles = body.coordinates.values()
+    definitions = dict(body.definitions)
+    for side, (x, y) in body.hips.items():
+        definitions |= dict(zip(HIP[side], (x, y), strict=True))
+    for leg in stance:
+        definitions |= leg.definitions
+    return Lagrangian(
+        coordinates=(X, Y, *(angle for angle, _ in angles)),
+        rates=(X_RATE, Y_RATE, *(rate for _, rate in angles)),
+        kinetic=body.kinetic,
+        potential=body.gravity + body.spine,
+        dissipation=body.power_lost / 2,
+        forces=tuple(leg.force for leg in stance),
+        definitions=definitions,
+    )
+
+
+def stance_legs(body: Body, phase: str, damped: bool) -> tuple[StanceLeg, ...]:
+    """The legs that stand in a phase."""
+    bare = lagrangian(body)
+    return tuple(
+        StanceLeg(leg, HIP[leg.side], hip_velocity(bare, HIP[leg.side]), damped)
+        for leg, phases in ((FORE, ("FS", "DS")), (HIND, ("HS", "DS")))
+        if phase in phases
+    )
+
+
+@lru_cache(maxsize=32)
+def bounder_system(name: str, body: Body, damped_legs: bool) -> HybridSystem:
+    """Assemble the hybrid system of a body on two legs.
+
+    Without ``damped_legs`` the damping coefficients are taken to be zero, which spares their
+    terms.
+    """
+    angles = body.coordinates.values()
+    states = (
+        X, Y, *(a for a, _ in angles), X_RATE, Y_RATE, *(r for _, r in angles), DISSIPATED,
+    )  # fmt: skip
+    built: dict[str, Mode] = {}
+
+    def mode(phase: str) -> Mode:
+        if phase not in built:
+            built[phase] = _mode(body, phase, damped_legs)
+        return built[phase]
+
+    return HybridSystem(
+        name=name,
+        states=states,
+        held=(FORE.toe, HIND.toe, FORE.stanced, HIND.stanced),
+        parameters=(*body.parameters.values(), FORE.gamma, HIND.gamma),
+        modes=PHASES,
+        mode=mode,
+        section=Section(
+            guard="apex",
+            requires={FORE.stanced: 1.0, HIND.stanced: 1.0},
+            resets={FORE.stanced: 0.0, HIND.stanced: 0.0},
+            coordinates={
+                "height": Y,
+                **{n: a for n, (a, _) in body.coordinates.items()},
+                "speed": X_RATE,
+                **{f"{n}_rate": r for n, (_, r) in body.coordinates.items()},
+            },
+            missed=NO_APEX,
+        ),
+    )
+
+
+def _mode(body: Body, phase: str, damped: bool) -> Mode:
+    stance = stance_legs(body, phase, damped)
+    standing = {leg.leg.side for leg in stance}
+    swing = [SwingLeg(leg, HIP[leg.side]) for leg in (FORE, HIND) if leg.side not in standing]
+    mechanics = lagrangian(body, stance)
+    solving, accelerations = mechanics.accelerations()
+    rates = dict(zip(mechanics.coordinates, mechanics.rates, strict=True))
+    rates |= dict(zip(mechanics.rates, accelerations, strict=True))
+    rates[DISSIPATED] = body.power_lost + sp.Add(*(leg.power_lost for leg in stance))
+    guards = [leg.touchdown(_phase(standing | {leg.leg.side})) for leg in swing]
+    guards += [leg.liftoff(_phase(standing - {leg.leg.side}), DISSIPATED) for leg in stance]
+    if not stance:
+        guards.append(Guard("apex", Y_RATE))
+    # The CoM lies between the hips and the low points, so it is never the first to touch.
+    lows = {f"{side} hip": HIP[side][1] for side in HIP} | dict(body.low_points)
+    guards += [
+        Guard(f"{what} on the ground", height, arming=Arming.LEVEL, ends=FELL)
+        for what, height in lows.items()
+    ]
+    observables: dict[str, sp.Expr] = {}
+    for leg in (*stance, *swing):
+        observables |= leg.observables()
+        side = leg.leg.side
+        observables |= {f"{side}_hip_x": HIP[side][0], f"{side}_hip_y": HIP[side][1]}
+    observables |= body.observables
+    observables |= {
+        "kinetic_energy": body.kinetic,
+        "gravity_energy": body.gravity,
+        "leg_energy": sp.Add(*(leg.energy for leg in stance)),
+        "spine_energy": body.spine,
+    }
+    return Mode(
+        phase, {**mechanics.definitions, **solving}, rates, tuple(guards), observables
+    )
+
+
+def _phase(standing: set[str]) -> str:
+    return {(): "DF", ("fore",): "FS", ("hind",): "HS"}.get(tuple(sorted(standing)), "DS")

@@ -1,0 +1,177 @@
+"""Massless spring legs: parameters, force, touchdown and lift-off.
+
+A leg pair acts as one leg. In flight it keeps its rest length and its touchdown angle from the
+vertical, foot ahead of the hip positive. In stance the toe is a frictionless pin on flat ground.
+Source: Kamimura et al. 2015, Artif Life Robotics 20:270-275; damping is an addition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from flexspine.hybrid.system import Arming, Guard
+from flexspine.mechanics.lagrangian import AppliedForce, Lagrangian, time_derivative
+from flexspine.parameters import ParameterSet, quantity
+
+Symbols = dict[str, sp.Symbol]
+
+
+class Leg(ParameterSet):
+    """One pair of legs that act together."""
+
+    stiffness: float = quantity("N/m", "leg stiffness, per pair of legs", above=0, upper=1e9)
+    damping: float = quantity(
+        "N s/m", "leg damping, per pair of legs", at_least=0, upper=1e6, default=0.0
+    )
+    rest_length: float = quantity("m", "unloaded leg length", above=0, upper=100)
+
+
+@dataclass(frozen=True)
+class LegSymbols:
+    """The letters of one leg: parameters, touchdown angle, toe and stance memory."""
+
+    side: str
+    k: sp.Symbol
+    c: sp.Symbol
+    length: sp.Symbol
+    gamma: sp.Symbol
+    toe: sp.Symbol
+    stanced: sp.Symbol
+
+    @classmethod
+    def of(cls, side: str) -> LegSymbols:
+        """Return the letters for ``fore`` or ``hind``, with the side's initial as subscript."""
+        s = side[0]
+        return cls(
+            side,
+            *(
+                sp.Symbol(f"{letter}_{s}", real=True)
+                for letter in ("k", "c", "l", "gamma", "s", "n")
+            ),
+        )
+
+    @property
+    def parameters(self) -> Symbols:
+        """Dotted parameter name to letter."""
+        return {
+            f"{self.side}.leg.stiffness": self.k,
+            f"{self.side}.leg.damping": self.c,
+            f"{self.side}.leg.rest_length": self.length,
+        }
+
+
+class StanceLeg:
+    """The expressions of a leg whose toe is pinned.
+
+    With the vector from toe to hip ``(u, Y)`` and its length ``l``, the leg force is
+    ``F = k (l0 - l) - c l'``; what is computed is the strain-like ``sigma = F / (k l)``, which
+    needs one root only, vanishes with the force and gives the force vector ``k sigma (u, Y)``.
+    """
+
+    def __init__(
+        self,
+        leg: LegSymbols,
+        hip: tuple[sp.Symbol, sp.Symbol],
+        hip_velocity: tuple[sp.Expr, sp.Expr],
+        damped: bool,
+    ) -> None:
+        s = leg.side[0]
+        u, inverse, stretching, sigma = (
+            sp.Symbol(f"{letter}_{s}", real=True) for letter in ("u", "r", "w", "sigma")
+        )
+        self.leg, self.hip = leg, hip
+        self.u, self.inverse, self.sigma = u, inverse, sigma
+        self.definitions: dict[sp.Symbol, sp.Expr] = {
+            u: hip[0] - leg.toe,
+            inverse: (u**2 + hip[1] ** 2) ** sp.Rational(-1, 2),
+        }
+        strain = leg.length * inverse - 1
+        self.rate: sp.Expr = sp.S.Zero
+        if damped:
+            self.definitions[stretching] = (
+                u * hip_velocity[0] + hip[1] * hip_velocity[1]
+            ) * inverse
+            self.rate = stretching
+            strain -= leg.c / leg.k * stretching * inverse
+        self.definitions[sigma] = strain
+
+    @property
+    def force(self) -> AppliedForce:
+        """The force of the leg on its hip; the ground reaction force has the same components."""
+        load = self.leg.k * self.sigma
+        return AppliedForce((load * self.u, load * self.hip[1]), self.hip)
+
+    @property
+    def energy(self) -> sp.Expr:
+        """Elastic energy, in J."""
+        return self.leg.k * (self.leg.length - 1 / self.inverse) ** 2 / 2
+
+    @property
+    def power_lost(self) -> sp.Expr:
+        """Power that goes into the damper, in W."""
+        return self.leg.c * self.rate**2
+
+    def liftoff(self, target: str, dissipated: sp.Symbol) -> Guard:
+        """The leg leaves the ground when its force falls to zero; it never pulls.
+
+        A damper reaches zero force while the spring is still compressed. The leg is massless, so
+        that energy is lost at the instant of release.
+        """
+        released = {dissipated: dissipated + self.energy} if self.rate != 0 else {}
+        return Guard(
+            f"{self.leg.side} lift-off", self.sigma, target, released, arming=Arming.LEVEL
+        )
+
+    def observables(self) -> dict[str, sp.Expr]:
+        """Toe, length, angle and ground reaction force."""
+        side, leg, (_, height) = self.leg.side, self.leg, self.hip
+        load = leg.k * self.sigma
+        return {
+            f"{side}_toe_x": leg.toe,
+            f"{side}_toe_y": sp.S.Zero,
+            f"{side}_leg_length": 1 / self.inverse,
+            f"{side}_leg_angle": sp.atan2(-self.u, height),
+            f"{side}_grf_x": load * self.u,
+            f"{side}_grf_y": load * height,
+            f"{side}_grf": load / self.inverse,
+        }
+
+
+class SwingLeg:
+    """The expressions of a leg in the air."""
+
+    def __init__(self, leg: LegSymbols, hip: tuple[sp.Symbol, sp.Symbol]) -> None:
+        self.leg, self.hip = leg, hip
+
+    def touchdown(self, target: str) -> Guard:
+        """The toe meets the ground when the hip falls through ``l0 cos(gamma)``.
+
+        Falling through it needs having been above it, which is all that arming asks for.
+        """
+        leg, (x, y) = self.leg, self.hip
+        return Guard(
+            f"{leg.side} touchdown",
+            y - leg.length * sp.cos(leg.gamma),
+            target,
+            {leg.toe: x + leg.length * sp.sin(leg.gamma), leg.stanced: sp.S.One},
+        )
+
+    def observables(self) -> dict[str, sp.Expr]:
+        """As in stance; the toe is where the leg held out for touchdown has it."""
+        side, leg, (x, y) = self.leg.side, self.leg, self.hip
+        return {
+            f"{side}_toe_x": x + leg.length * sp.sin(leg.gamma),
+            f"{side}_toe_y": y - leg.length * sp.cos(leg.gamma),
+            f"{side}_leg_length": leg.length,
+            f"{side}_leg_angle": leg.gamma,
+            f"{side}_grf_x": sp.S.Zero,
+            f"{side}_grf_y": sp.S.Zero,
+            f"{side}_grf": sp.S.Zero,
+        }
+
+
+def hip_velocity(body: Lagrangian, hip: tuple[sp.Symbol, sp.Symbol]) -> tuple[sp.Expr, sp.Expr]:
+    """The velocity of a hip, by the chain rule."""
+    return time_derivative(body, hip[0]), time_derivative(body, hip[1])

@@ -1,0 +1,155 @@
+"""A bounder with numbers: parameters, a start and touchdown angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import isfinite, pi
+from typing import Any
+
+import numpy as np
+
+from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.system import HybridSystem
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.models.bounder import BounderKind
+from flexspine.parameters import ParameterSet, replaced, values
+
+SIDES = ("fore", "hind")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a model's numbers come from.
+
+    ``provenance`` tells it per dotted name where it differs from ``source``.
+    """
+
+    title: str
+    citation: str = ""
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def of(self, name: str) -> str:
+        """Return where the value of ``name`` comes from."""
+        return self.provenance.get(name, self.source)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A bounder ready to run. All values in SI and radians.
+
+    ``apex`` is the start, by section coordinate; ``touchdown`` the angle of each leg from the
+    vertical at touchdown, foot ahead of the hip positive.
+    """
+
+    name: str
+    kind: BounderKind
+    parameters: ParameterSet
+    apex: Mapping[str, float]
+    touchdown: Mapping[str, float]
+    source: Source
+
+    def __post_init__(self) -> None:
+        coordinates = self.system.section.coordinates
+        _check_numbers("apex coordinate", self.apex, coordinates)
+        _check_numbers("touchdown angle", self.touchdown, SIDES)
+        for side, angle in self.touchdown.items():
+            if not abs(angle) < pi / 2:
+                raise ParameterError(
+                    f"touchdown angle '{side}' = {angle:g} rad is beyond the horizontal",
+                    "give an angle from the vertical between -1.57 and 1.57 rad",
+                )
+
+    def with_values(
+        self,
+        parameters: Mapping[str, Any] | None = None,
+        *,
+        apex: Mapping[str, float] | None = None,
+        touchdown: Mapping[str, float] | None = None,
+    ) -> Model:
+        """Return the same model with some values changed, parameters by dotted name.
+
+        Raises `UnknownNameError` and `ParameterError`.
+        """
+        changed = dict(parameters or {})
+        names = [*changed, *(["apex"] if apex else []), *(["touchdown"] if touchdown else [])]
+        source = replace(
+            self.source, provenance={**self.source.provenance, **dict.fromkeys(names, "set by user")}
+        )
+        return replace(
+            self,
+            parameters=replaced(self.parameters, changed) if changed else self.parameters,
+            apex={**self.apex, **(apex or {})},
+            touchdown={**self.touchdown, **(touchdown or {})},
+            source=source,
+        )
+
+    def renamed(self, name: str, source: Source) -> Model:
+        """Return the same numbers under another name and origin."""
+        return replace(self, name=name, source=source)
+
+    @cached_property
+    def system(self) -> HybridSystem:
+        """The hybrid system behind the model."""
+        return self.kind.system(self.parameters)
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        """Public names of the states, in order."""
+        coordinates = ("com_x", "com_y", *self.kind.body(False).coordinates)
+        return (*coordinates, *(f"{name}_rate" for name in coordinates), "dissipated_energy")
+
+    @property
+    def apex_names(self) -> tuple[str, ...]:
+        """Names of the section coordinates, in order."""
+        return tuple(self.system.section.coordinates)
+
+    @cached_property
+    def parameter_vector(self) -> Array:
+        """Parameters and touchdown angles in the order of ``system.parameters``."""
+        given = values(self.parameters)
+        body = self.kind.body(False)
+        return np.array(
+            [*(given[name] for name in body.parameters), *(self.touchdown[s] for s in SIDES)]
+        )
+
+    def bind(self, tolerance: float) -> BoundSystem:
+        """Compile the system for a tolerance and give it this model's numbers."""
+        return BoundSystem(compile_system(self.system, tolerance), self.parameter_vector)
+
+    def apex_state(self) -> HybridState:
+        """The start in flight, at the apex."""
+        name_of = dict(zip(self.system.states, self.state_names, strict=True))
+        section = self.system.section.coordinates
+        return self.state({name_of[symbol]: self.apex[c] for c, symbol in section.items()})
+
+    def state(self, start: Mapping[str, float], toes: Mapping[str, float] | None = None) -> HybridState:
+        """Any state, by state name (absent ones are zero); ``toes`` (m) are those on the ground.
+
+        Raises `UnknownNameError` and `ParameterError`.
+        """
+        toes = toes or {}
+        _check_numbers("state", {**dict.fromkeys(self.state_names, 0.0), **start}, self.state_names)
+        _check_numbers("toe", {**dict.fromkeys(SIDES, 0.0), **toes}, SIDES)
+        states = np.array([float(start.get(name, 0.0)) for name in self.state_names])
+        phase = {(): "DF", ("fore",): "FS", ("hind",): "HS"}.get(tuple(sorted(toes)), "DS")
+        held = np.array(
+            [*(float(toes.get(s, states[0])) for s in SIDES), *(float(s in toes) for s in SIDES)]
+        )
+        return HybridState(0.0, phase, states, held)
+
+
+def _check_numbers(kind: str, given: Mapping[str, Any], known: Any) -> None:
+    for name, value in given.items():
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+            raise ParameterError(f"{kind} '{name}' = {value} is not usable", "give a finite number")
+    for name in known:
+        if name not in given:
+            raise ParameterError(f"{kind} '{name}' has no value", f"give it, e.g. {name}=...")

@@ -1,0 +1,141 @@
+"""Presets and users' own parameter files, both TOML of the same form."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from flexspine.errors import PresetError, UnknownNameError
+from flexspine.models.model import Model, Source
+from flexspine.models.registry import find_kind
+from flexspine.parameters import build, flattened
+
+_TABLES = {"parameters", "apex", "touchdown", "provenance"}
+_TEXTS = {"model", "base", "title", "citation", "source"}
+_LISTS = {"notes", "doubts"}
+
+
+def preset_names() -> list[str]:
+    """Return the names of the presets that come with flexspine."""
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in (files("flexspine") / "presets").iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def load_model(
+    preset: str | Path,
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    apex: Mapping[str, float] | None = None,
+    touchdown: Mapping[str, float] | None = None,
+) -> Model:
+    """Load a preset by name, or a TOML file by path, with some values changed.
+
+    ``parameters`` by dotted name (``{"spine.stiffness": 240}``), ``apex`` by section coordinate,
+    ``touchdown`` by leg; SI and radians. Raises `UnknownNameError`, `PresetError`,
+    `ParameterError`.
+    """
+    name, text = _find(str(preset))
+    content = _parse(name, text)
+    try:
+        model = _model(name, content)
+    except PresetError:
+        raise
+    except UnknownNameError as failure:
+        if str(preset) in preset_names():
+            raise
+        raise PresetError(f"{preset}: {failure.message}", failure.remedy) from None
+    return model.with_values(parameters, apex=apex, touchdown=touchdown)
+
+
+def _find(preset: str) -> tuple[str, str]:
+    if preset in preset_names():
+        resource = files("flexspine") / "presets" / f"{preset}.toml"
+        return preset, resource.read_text(encoding="utf-8")
+    path = Path(preset)
+    if path.suffix != ".toml" and not path.exists():
+        raise UnknownNameError("preset", preset, preset_names())
+    try:
+        return preset, path.read_text(encoding="utf-8")
+    except OSError as failure:
+        raise PresetError(
+            f"cannot read '{preset}' ({failure.strerror})", "give a readable TOML file"
+        ) from None
+    except UnicodeDecodeError:
+        raise PresetError(f"'{preset}' is not text", "give a TOML file in UTF-8") from None
+
+
+def _parse(name: str, text: str) -> dict[str, Any]:
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as failure:
+        raise PresetError(f"'{name}' is not valid TOML: {failure}", "mend that line") from None
+    for key, value in content.items():
+        if key not in _TABLES | _TEXTS | _LISTS:
+            raise PresetError(
+                f"'{name}': unknown entry '{key}'",
+                f"known: {', '.join(sorted(_TABLES | _TEXTS | _LISTS))}",
+            )
+        wanted = dict if key in _TABLES else str if key in _TEXTS else list
+        if not isinstance(value, wanted):
+            kind = {dict: "a table", str: "a text", list: "a list of texts"}[wanted]
+            raise PresetError(f"'{name}': '{key}' is not {kind}", f"make it {kind}")
+    return content
+
+
+def _model(name: str, content: Mapping[str, Any]) -> Model:
+    title = Path(name).stem if name.endswith(".toml") else name
+    if "base" in content:
+        return _based(title, name, content)
+    if "model" not in content:
+        raise PresetError(f"'{name}' names no model", 'add model = "..." or base = "PRESET"')
+    kind = find_kind(content["model"])
+    return Model(
+        name=title,
+        kind=kind,
+        parameters=build(kind.parameters, flattened(content.get("parameters", {}))),
+        apex=_numbers(content, "apex"),
+        touchdown=_numbers(content, "touchdown"),
+        source=Source(
+            title=content.get("title", kind.title),
+            citation=content.get("citation", ""),
+            source=content.get("source", f"file {name}"),
+            notes=tuple(content.get("notes", ())),
+            doubts=tuple(content.get("doubts", ())),
+            provenance=flattened(content.get("provenance", {})),
+        ),
+    )
+
+
+def _based(title: str, name: str, content: Mapping[str, Any]) -> Model:
+    """A file that changes some values of a preset."""
+    if "model" in content:
+        raise PresetError(f"'{name}' has both 'model' and 'base'", "keep one of them")
+    base = load_model(content["base"])
+    changed = flattened(content.get("parameters", {}))
+    model = base.with_values(
+        changed, apex=_numbers(content, "apex"), touchdown=_numbers(content, "touchdown")
+    )
+    told = {key: f"file {name}" for key in (*changed, *({"apex", "touchdown"} & content.keys()))}
+    provenance = {**model.source.provenance, **told, **flattened(content.get("provenance", {}))}
+    source = Source(
+        title=content.get("title", base.source.title),
+        citation=content.get("citation", base.source.citation),
+        source=base.source.source,
+        notes=(*base.source.notes, *content.get("notes", ())),
+        doubts=(*base.source.doubts, *content.get("doubts", ())),
+        provenance=provenance,
+    )
+    return model.renamed(title, source)
+
+
+def _numbers(content: Mapping[str, Any], table: str) -> dict[str, float]:
+    return {
+        key: float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+        for key, value in content.get(table, {}).items()
+    }

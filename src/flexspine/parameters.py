@@ -1,0 +1,168 @@
+"""Frozen, validated parameters with unit, bounds and meaning, reached by dotted names.
+
+A model declares its parameters as nested `ParameterSet` classes whose fields are made by
+`quantity`. Everything else (the preset listing, `--set spine.stiffness=240`, provenance in a
+result file) works from those declarations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
+
+from flexspine.errors import ParameterError, UnknownNameError
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is declared about one parameter.
+
+    ``lower`` and ``upper`` are bounds in ``unit``; ``lower_is_open`` tells ``>`` from ``>=``.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    lower: float
+    upper: float
+    lower_is_open: bool
+
+    @property
+    def bounds(self) -> str:
+        """The bounds as an interval, such as ``(0, 1e+06]``."""
+        return f"{'(' if self.lower_is_open else '['}{self.lower:g}, {self.upper:g}]"
+
+
+class ParameterSet(BaseModel):
+    """A frozen group of parameters; unknown names, wrong types and NaN are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+P = TypeVar("P", bound=ParameterSet)
+
+
+def quantity(
+    unit: str,
+    meaning: str,
+    *,
+    upper: float,
+    above: float | None = None,
+    at_least: float | None = None,
+    default: Any = ...,
+) -> Any:
+    """Declare one parameter: its unit, what it means and the bounds it must keep."""
+    return Field(
+        default,
+        description=meaning,
+        gt=above,
+        ge=at_least,
+        le=upper,
+        allow_inf_nan=False,
+        json_schema_extra={"unit": unit},
+    )
+
+
+def quantities(kind: type[ParameterSet], prefix: str = "") -> Iterator[Quantity]:
+    """Yield every parameter of a class, nested ones by dotted name, in declared order."""
+    for name, field in kind.model_fields.items():
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, ParameterSet):
+            yield from quantities(annotation, f"{prefix}{name}.")
+        else:
+            yield _quantity(f"{prefix}{name}", field)
+
+
+def values(parameters: ParameterSet, prefix: str = "") -> dict[str, float]:
+    """Return every value by dotted name, in declared order (SI units, radians)."""
+    flat: dict[str, float] = {}
+    for name in type(parameters).model_fields:
+        value = getattr(parameters, name)
+        if isinstance(value, ParameterSet):
+            flat |= values(value, f"{prefix}{name}.")
+        else:
+            flat[f"{prefix}{name}"] = float(value)
+    return flat
+
+
+def build(kind: type[P], flat: Mapping[str, Any]) -> P:
+    """Make a parameter set from values by dotted name.
+
+    Raises `UnknownNameError` for a name the model does not have and `ParameterError` for a
+    missing value, a wrong type or a value outside its bounds.
+    """
+    declared = {item.name: item for item in quantities(kind)}
+    for name in flat:
+        if name not in declared:
+            raise UnknownNameError("parameter", name, declared)
+    try:
+        return kind.model_validate(nested(flat))
+    except ValidationError as failure:
+        raise _explained(failure, declared) from None
+
+
+def replaced(parameters: P, changes: Mapping[str, Any]) -> P:
+    """Return the same parameters with some values changed, by dotted name."""
+    return build(type(parameters), {**values(parameters), **changes})
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn ``{"a.b": 1}`` into ``{"a": {"b": 1}}``."""
+    tree: dict[str, Any] = {}
+    for dotted, value in flat.items():
+        *groups, leaf = dotted.split(".")
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = value
+    return tree
+
+
+def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Turn ``{"a": {"b": 1}}`` into ``{"a.b": 1}``."""
+    flat: dict[str, Any] = {}
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            flat |= flattened(value, f"{prefix}{name}.")
+        else:
+            flat[f"{prefix}{name}"] = value
+    return flat
+
+
+def _quantity(name: str, field: FieldInfo) -> Quantity:
+    bounds: dict[str, Any] = {}
+    for rule in field.metadata:
+        for key in ("gt", "ge", "le"):
+            if hasattr(rule, key):
+                bounds[key] = getattr(rule, key)
+    extra = field.json_schema_extra
+    return Quantity(
+        name=name,
+        unit=str(extra["unit"]) if isinstance(extra, dict) else "",
+        meaning=field.description or "",
+        lower=float(bounds.get("gt", bounds.get("ge", float("-inf")))),
+        upper=float(bounds["le"]),
+        lower_is_open="gt" in bounds,
+    )
+
+
+def _explained(failure: ValidationError, declared: Mapping[str, Quantity]) -> ParameterError:
+    """Say in one line what pydantic says in several; the first fault is the one told."""
+    fault = failure.errors()[0]
+    name = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "missing":
+        absent = name if name in declared else next(n for n in declared if n.startswith(name))
+        return ParameterError(f"parameter '{absent}' has no value", f"give it, e.g. {absent}=...")
+    if name not in declared:
+        return ParameterError(f"'{name}' is a group of parameters", f"set e.g. {name}.NAME=VALUE")
+    about = declared[name]
+    given = fault["input"]
+    shown = f"'{given}'" if isinstance(given, str) else f"{given}"
+    return ParameterError(
+        f"parameter '{name}' = {shown} is not usable",
+        f"give a number in {about.bounds} {about.unit} ({about.meaning})",
+    )
