@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from flexspine._version import __version__
 
 if TYPE_CHECKING:
-    from flexspine.errors import EnvironmentFailure, FlexspineError, InputError
+    from flexspine.errors import FlexspineError, InputError, MachineError
     from flexspine.gaits.measures import summarize
     from flexspine.models.dataset import to_dataset
     from flexspine.models.model import Model
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from flexspine.report.figure import plot_run
 
 _HOMES = {
-    "EnvironmentFailure": "errors",
+    "MachineError": "errors",
     "FlexspineError": "errors",
     "InputError": "errors",
     "Model": "models.model",
@@ -36,9 +36,9 @@ _HOMES = {
 }
 
 __all__ = [
-    "EnvironmentFailure",
     "FlexspineError",
     "InputError",
+    "MachineError",
     "Model",
     "Run",
     "__version__",

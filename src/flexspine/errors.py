@@ -7,7 +7,7 @@
     │   ├── PresetError         a preset file that cannot be read
     │   ├── StateError          an initial state that cannot be simulated
     │   └── OutputError         a place that results cannot be written to
-    └── EnvironmentFailure      the machine failed: disk, worker, missing extra   exit code 3
+    └── MachineError      the machine failed: disk, worker, missing extra   exit code 3
 
 A run that merely ends badly (it fell) raises nothing: that is an `Outcome`.
 """
@@ -77,7 +77,7 @@ class OutputError(InputError):
     code = "bad_output"
 
 
-class EnvironmentFailure(FlexspineError):
+class MachineError(FlexspineError):
     """The machine failed: the disk is full, a worker died, an extra is missing."""
 
     code = "environment"

@@ -30,7 +30,7 @@ class Due(NamedTuple):
     ``was_active``: in the mode before, too. ``by_level``: armed by level.
     """
 
-    index: int
+    position: int
     name: str
     was_active: bool
     by_level: bool
@@ -82,7 +82,7 @@ class CompiledMode:
     @property
     def terms(self) -> int:
         """Elementary operations per Taylor order in the field, guards included."""
-        return len(self.integrator.decomposition) - 2 * self.integrator.dim
+        return int(len(self.integrator.decomposition) - 2 * self.integrator.dim)
 
 
 class CompiledSystem:
@@ -93,9 +93,7 @@ class CompiledSystem:
         self.tolerance = tolerance
         self._modes: dict[str, CompiledMode] = {}
         self._observables: dict[str, Any] = {}
-        self._states = {
-            symbol: hy.make_vars(f"s{i}") for i, symbol in enumerate(system.states)
-        }
+        self._states = {symbol: hy.make_vars(f"s{i}") for i, symbol in enumerate(system.states)}
         self._held = {symbol: hy.par[i] for i, symbol in enumerate(system.held)}
         first = len(system.held)
         self._raw = {symbol: hy.par[first + i] for i, symbol in enumerate(system.parameters)}
@@ -177,9 +175,7 @@ class CompiledSystem:
         pairs: list[Any] = []
         for guard in mode.guards:
             value = lower(guard.expression)
-            slope = hy.sum(
-                [hy.diff(value, s) * f for s, f in zip(here, field, strict=True)]
-            )
+            slope = hy.sum([hy.diff(value, s) * f for s, f in zip(here, field, strict=True)])
             pairs += [value, slope]
         moved = {v: at[s] for s, v in (self._states | self._held).items() if at[s] != v}
         return list(hy.subs(pairs, moved)) if moved else pairs

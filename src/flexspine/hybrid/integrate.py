@@ -265,7 +265,9 @@ class _Run:
         )
         if not (grazing or crowded):
             return None
-        recent = [e for e in self.events[-4 * CHATTER_EVENTS :] if self.time - e.time < CHATTER_WINDOW]
+        recent = [
+            e for e in self.events[-4 * CHATTER_EVENTS :] if self.time - e.time < CHATTER_WINDOW
+        ]
         before = sum(name in event.names for event in recent)
         if before >= (CHATTER_EVENTS // 2 if grazing else CHATTER_EVENTS):
             return CHATTERED

@@ -6,12 +6,14 @@ Expressions are SymPy; `flexspine.hybrid.compile` turns them into machine code.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as default
 from enum import Enum
 
 import sympy as sp
 
 from flexspine.hybrid.outcome import OutcomeKind
+
 
 class Arming(Enum):
     """When a guard may fire."""
@@ -34,7 +36,7 @@ class Guard:
     name: str
     expression: sp.Expr
     target: str | None = None
-    resets: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    resets: Mapping[sp.Symbol, sp.Expr] = default(default_factory=dict)
     arming: Arming = Arming.CROSSING
     ends: OutcomeKind | None = None
 
@@ -56,7 +58,7 @@ class Mode:
     definitions: Mapping[sp.Symbol, sp.Expr]
     field: Mapping[sp.Symbol, sp.Expr]
     guards: tuple[Guard, ...]
-    observables: Mapping[str, sp.Expr] = field(default_factory=dict)
+    observables: Mapping[str, sp.Expr] = default(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,9 @@ class Arc:
 
     def __call__(self, times: Array) -> Array:
         """Return the states at ``times`` (s) by Horner's rule, shape (len(times), states)."""
-        step = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.series) - 1)
+        step = np.clip(
+            np.searchsorted(self.times, times, side="right") - 1, 0, len(self.series) - 1
+        )
         since = (times - self.times[step])[:, None]
         series = self.series[step]
         result = series[:, :, -1].copy()
@@ -77,9 +79,7 @@ class Arc:
     def until(self, time: float) -> Arc:
         """Return the arc cut off at ``time`` (s)."""
         kept = max(int(np.searchsorted(self.times, time)), 1)
-        return replace(
-            self, times=np.append(self.times[:kept], time), series=self.series[:kept]
-        )
+        return replace(self, times=np.append(self.times[:kept], time), series=self.series[:kept])
 
 
 @dataclass(frozen=True)

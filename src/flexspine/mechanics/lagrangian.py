@@ -64,9 +64,7 @@ class Lagrangian:
             ) / 2
             return christoffel * rates[j] * rates[k]
 
-        return tuple(
-            sp.Add(*(term(i, j, k) for j in range(n) for k in range(n))) for i in range(n)
-        )
+        return tuple(sp.Add(*(term(i, j, k) for j in range(n) for k in range(n))) for i in range(n))
 
     @cached_property
     def generalized_forces(self) -> tuple[sp.Expr, ...]:
@@ -152,9 +150,7 @@ def time_derivative(system: Lagrangian, expression: sp.Expr) -> sp.Expr:
     )
 
 
-def total_derivative(
-    expression: sp.Expr, variable: sp.Symbol, definitions: Definitions
-) -> sp.Expr:
+def total_derivative(expression: sp.Expr, variable: sp.Symbol, definitions: Definitions) -> sp.Expr:
     """Differentiate through definitions by the chain rule, without expanding them."""
     result = sp.diff(expression, variable)
     for symbol in expression.free_symbols & definitions.keys():

@@ -21,7 +21,7 @@ from flexspine.parameters import ParameterSet, values
 
 FELL = OutcomeKind(
     "fell",
-    "start from a gait, choose other touchdown angles, or stabilise; most passive gaits are unstable",
+    "start from a gait or choose other touchdown angles; most passive gaits are unstable",
 )
 NO_APEX = OutcomeKind(
     "no_apex",
@@ -168,21 +168,23 @@ def _mode(body: Body, phase: str, damped: bool) -> Mode:
         Guard(f"{what} on the ground", height, arming=Arming.LEVEL, ends=FELL)
         for what, height in lows.items()
     ]
-    observables: dict[str, sp.Expr] = {}
-    for leg in (*stance, *swing):
-        observables |= leg.observables()
+    observables = _observables(body, (*stance, *swing))
+    observables["leg_energy"] = sp.Add(*(leg.energy for leg in stance))
+    return Mode(phase, {**mechanics.definitions, **solving}, rates, tuple(guards), observables)
+
+
+def _observables(body: Body, legs: tuple[StanceLeg | SwingLeg, ...]) -> dict[str, sp.Expr]:
+    table: dict[str, sp.Expr] = {}
+    for leg in legs:
         side = leg.leg.side
-        observables |= {f"{side}_hip_x": HIP[side][0], f"{side}_hip_y": HIP[side][1]}
-    observables |= body.observables
-    observables |= {
+        table |= leg.observables()
+        table |= {f"{side}_hip_x": HIP[side][0], f"{side}_hip_y": HIP[side][1]}
+    return table | {
+        **body.observables,
         "kinetic_energy": body.kinetic,
         "gravity_energy": body.gravity,
-        "leg_energy": sp.Add(*(leg.energy for leg in stance)),
         "spine_energy": body.spine,
     }
-    return Mode(
-        phase, {**mechanics.definitions, **solving}, rates, tuple(guards), observables
-    )
 
 
 def _phase(standing: set[str]) -> str:

@@ -12,7 +12,7 @@ from functools import lru_cache
 import sympy as sp
 from sympy import cos, sin
 
-from flexspine.models.bounder import FORE, GRAVITY, HIND, X, X_RATE, Y, Y_RATE, Body, BounderKind
+from flexspine.models.bounder import FORE, GRAVITY, HIND, X_RATE, Y_RATE, Body, BounderKind, X, Y
 from flexspine.models.legs import Leg
 from flexspine.parameters import ParameterSet, quantity
 

@@ -120,9 +120,7 @@ class StanceLeg:
         that energy is lost at the instant of release.
         """
         released = {dissipated: dissipated + self.energy} if self.rate != 0 else {}
-        return Guard(
-            f"{self.leg.side} lift-off", self.sigma, target, released, arming=Arming.LEVEL
-        )
+        return Guard(f"{self.leg.side} lift-off", self.sigma, target, released, arming=Arming.LEVEL)
 
     def observables(self) -> dict[str, sp.Expr]:
         """Toe, length, angle and ground reaction force."""

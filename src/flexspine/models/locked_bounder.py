@@ -12,7 +12,7 @@ import sympy as sp
 
 from flexspine.models.bounder import FORE, GRAVITY, HIND, Body, BounderKind
 from flexspine.models.flexible_bounder import FORE_HALF, HIND_HALF, MU, Segment
-from flexspine.models.rigid_bounder import H_F, H_H, I, M, rigid_body
+from flexspine.models.rigid_bounder import H_F, H_H, INERTIA, M, rigid_body
 from flexspine.parameters import ParameterSet, quantity
 
 # Parameters
@@ -38,7 +38,7 @@ def _body(_damped_spine: bool) -> Body:
     constants = {
         M: fore.m + hind.m,
         MU: fore.m * hind.m / M,
-        I: fore.J + hind.J + MU * (fore.a + hind.a) ** 2,
+        INERTIA: fore.J + hind.J + MU * (fore.a + hind.a) ** 2,
         ahead: (hind.m * hind.a - fore.m * fore.a) / M,
         H_F: fore.a + fore.h + ahead,
         H_H: hind.a + hind.h - ahead,

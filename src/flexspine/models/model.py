@@ -79,7 +79,8 @@ class Model:
         changed = dict(parameters or {})
         names = [*changed, *(["apex"] if apex else []), *(["touchdown"] if touchdown else [])]
         source = replace(
-            self.source, provenance={**self.source.provenance, **dict.fromkeys(names, "set by user")}
+            self.source,
+            provenance={**self.source.provenance, **dict.fromkeys(names, "set by user")},
         )
         return replace(
             self,
@@ -128,7 +129,9 @@ class Model:
         section = self.system.section.coordinates
         return self.state({name_of[symbol]: self.apex[c] for c, symbol in section.items()})
 
-    def state(self, start: Mapping[str, float], toes: Mapping[str, float] | None = None) -> HybridState:
+    def state(
+        self, start: Mapping[str, float], toes: Mapping[str, float] | None = None
+    ) -> HybridState:
         """Any state, by state name (absent ones are zero); ``toes`` (m) are those on the ground.
 
         Raises `UnknownNameError` and `ParameterError`.

@@ -121,7 +121,7 @@ def _based(title: str, name: str, content: Mapping[str, Any]) -> Model:
     model = base.with_values(
         changed, apex=_numbers(content, "apex"), touchdown=_numbers(content, "touchdown")
     )
-    told = {key: f"file {name}" for key in (*changed, *({"apex", "touchdown"} & content.keys()))}
+    told = dict.fromkeys((*changed, *({"apex", "touchdown"} & content.keys())), f"file {name}")
     provenance = {**model.source.provenance, **told, **flattened(content.get("provenance", {}))}
     source = Source(
         title=content.get("title", base.source.title),

@@ -11,7 +11,7 @@ from functools import lru_cache
 import sympy as sp
 from sympy import cos, sin
 
-from flexspine.models.bounder import FORE, GRAVITY, HIND, X, X_RATE, Y, Y_RATE, Body, BounderKind
+from flexspine.models.bounder import FORE, GRAVITY, HIND, X_RATE, Y_RATE, Body, BounderKind, X, Y
 from flexspine.models.legs import Leg
 from flexspine.parameters import ParameterSet, quantity
 
@@ -46,7 +46,7 @@ class RigidBounderParameters(ParameterSet):
 # Geometry and energies
 
 THETA, THETA_RATE = sp.symbols("theta thetadot", real=True)
-M, I, H_F, H_H = sp.symbols("m I h_f h_h", real=True, positive=True)
+M, INERTIA, H_F, H_H = sp.symbols("m I h_f h_h", real=True, positive=True)
 
 
 def rigid_body(parameters: dict[str, sp.Symbol], constants: dict[sp.Symbol, sp.Expr]) -> Body:
@@ -58,7 +58,7 @@ def rigid_body(parameters: dict[str, sp.Symbol], constants: dict[sp.Symbol, sp.E
         coordinates={"pitch": (THETA, THETA_RATE)},
         parameters=parameters,
         definitions=constants,
-        kinetic=M * (X_RATE**2 + Y_RATE**2) / 2 + I * THETA_RATE**2 / 2,
+        kinetic=M * (X_RATE**2 + Y_RATE**2) / 2 + INERTIA * THETA_RATE**2 / 2,
         gravity=M * GRAVITY * Y,
         hips={
             "fore": (X + H_F * cos(THETA), Y + H_F * sin(THETA)),
@@ -71,7 +71,7 @@ def rigid_body(parameters: dict[str, sp.Symbol], constants: dict[sp.Symbol, sp.E
 def _body(_damped_spine: bool) -> Body:
     parameters = {
         "body.mass": M,
-        "body.inertia": I,
+        "body.inertia": INERTIA,
         "fore.hip_offset": H_F,
         **FORE.parameters,
         "hind.hip_offset": H_H,

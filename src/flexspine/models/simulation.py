@@ -35,13 +35,17 @@ class Run:
         return self.trajectory.modes
 
     @property
+    def section_points(self) -> tuple[HybridState, ...]:
+        """The apexes, the start included if the run began at one."""
+        trajectory = self.trajectory
+        climbing = trajectory.start.states[self.model.state_names.index("com_y_rate")]
+        at_apex = trajectory.start.mode == "DF" and climbing == 0
+        return ((trajectory.start,) if at_apex else ()) + trajectory.crossings
+
+    @property
     def apexes(self) -> list[dict[str, float]]:
         """Section states by name, the start included if the run began at an apex."""
-        trajectory = self.trajectory
-        rate = self.model.state_names.index("com_y_rate")
-        began = trajectory.start.mode == "DF" and trajectory.start.states[rate] == 0
-        points = [trajectory.start] if began else []
-        return [self.section_state(point) for point in (*points, *trajectory.crossings)]
+        return [self.section_state(point) for point in self.section_points]
 
     def section_state(self, point: HybridState) -> dict[str, float]:
         """The section coordinates of a point, by name."""

@@ -1,0 +1,5 @@
+"""The command line: the only place that joins everything."""
+
+from flexspine.cli.app import main
+
+__all__ = ["main"]

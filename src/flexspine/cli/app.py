@@ -1,0 +1,93 @@
+"""The ``flexspine`` command: verbs, exit codes, and how errors are told.
+
+Exit codes: 0 done, 1 the run ended without its goal, 2 bad input, 3 the machine failed,
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from flexspine._version import __version__
+from flexspine.cli import bound, cache, equations, presets
+from flexspine.cli.output import fail
+from flexspine.errors import FlexspineError, InputError, MachineError
+
+# Typer has carried its own click since 0.26 and used the installed one before.
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+
+app = typer.Typer(
+    name="flexspine",
+    help="Bounding quadrupeds with a rigid or a flexible spine.",
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("bound")(bound.bound)
+app.command("presets")(presets.presets)
+app.command("equations")(equations.equations)
+app.add_typer(cache.app, name="cache")
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _common(
+    context: typer.Context,
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main() -> NoReturn:
+    """Run the command line and leave with its exit code."""
+    sys.exit(_run(sys.argv[1:]))
+
+
+def _run(arguments: list[str]) -> int:
+    as_json = "--json" in arguments
+    try:
+        code = app(arguments, standalone_mode=False)
+    except UsageError as failure:
+        if type(failure).__name__ == "NoArgsIsHelpError":
+            return 2  # the help it stands for is printed already
+        return fail(_usage(failure), as_json)
+    except FlexspineError as failure:
+        return fail(failure, as_json)
+    except (KeyboardInterrupt, typer.Abort):
+        print("flexspine: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader went away; Python would complain once more while flushing at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as failure:
+        return fail(_disk(failure), as_json)
+    return code if isinstance(code, int) else 0
+
+
+def _usage(failure: Any) -> InputError:
+    command = failure.ctx.command_path if failure.ctx else "flexspine"
+    message = failure.format_message().rstrip(".").replace("\n", " ")
+    return InputError(message[:1].lower() + message[1:], f"see '{command} --help'")
+
+
+def _disk(failure: OSError) -> MachineError:
+    where = f" '{failure.filename}'" if failure.filename else ""
+    full = failure.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedy = "free some space and run it again" if full else "look at the disk and run it again"
+    return MachineError(f"cannot use{where} ({failure.strerror or failure})", remedy)

@@ -1,0 +1,109 @@
+"""``flexspine bound``: simulate bounding and hand over data, a figure and an animation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from flexspine.cli.options import Apex, Assignments, Json, Touchdown, assignments
+from flexspine.cli.output import print_json, steps
+
+DEFAULT_PRESET = "kamimura2015-flexible"
+
+
+def bound(
+    preset: Annotated[
+        str, typer.Option(help="A preset (see 'flexspine presets') or a TOML file.")
+    ] = DEFAULT_PRESET,
+    set_: Assignments = None,
+    apex: Apex = None,
+    touchdown: Touchdown = None,
+    strides: Annotated[
+        int | None, typer.Option(min=1, help="How many strides to run (1 unless --seconds is given).")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Run this many seconds instead of counting strides.")
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="Tolerance of the integrator.")] = 1e-12,
+    interval: Annotated[
+        float, typer.Option(help="Seconds between samples in the written data.")
+    ] = 1e-3,
+    out: Annotated[
+        Path | None, typer.Option(help="Write data, figures and animations into this directory.")
+    ] = None,
+    animation: Annotated[
+        bool, typer.Option("--animation/--no-animation", help="Make animations with --out.")
+    ] = True,
+    json: Json = False,
+) -> int:
+    """Simulate bounding from an apex.
+
+    Units are SI and radians. Exit code 0: all strides done; 1: the run ended otherwise, for
+    example by a fall; 2: bad input; 3: the machine failed.
+
+    Examples:
+        flexspine bound --strides 3 --out results
+
+        flexspine bound --set spine.stiffness=240 --apex height=0.33 --json
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.gaits.record import run_record
+    from flexspine.models.presets import load_model
+    from flexspine.models.simulation import simulate
+
+    model = load_model(
+        preset,
+        assignments("--set", set_),
+        apex=assignments("--apex", apex),  # type: ignore[arg-type]  # checked by the model
+        touchdown=assignments("--touchdown", touchdown),  # type: ignore[arg-type]
+    )
+    directory = None if out is None else ResultDirectory(out)
+    with steps() as progress:
+        progress.begin("simulating")
+        run = simulate(model, strides=strides, duration=seconds, tolerance=tolerance)
+        record = run_record(run)
+        if directory is not None:
+            directory.write(run, record, interval, animation, progress)
+    if json:
+        print_json(record)
+    else:
+        print(_report(record))
+        if directory is not None:
+            print(f"results in {directory.path}")
+    return 0 if run.outcome.completed else 1
+
+
+def _report(record: dict[str, Any]) -> str:
+    """The run in a few lines for a person."""
+    lines = [f"{record['preset']}: {record['outcome']} ({record['message']})"]
+    if record["outcome"] != "completed":
+        lines.append(f"  advice           {record['advice']}")
+    lines.append(f"  phases           {_shortened(record['phases'])}")
+    peak, vertical, duty = (record[k] for k in ("peak_grf", "peak_grf_vertical", "duty_factor"))
+    lines += _line("mean speed", record["mean_speed"], "m/s")
+    lines += _line("stride period", record["period"], "s")
+    lines += _line("stride length", record["stride_length"], "m")
+    lines.append(
+        f"  peak GRF         fore {peak['fore']:.2f} N, hind {peak['hind']:.2f} N "
+        f"(vertical {vertical['fore']:.2f} N, {vertical['hind']:.2f} N; per pair of legs)"
+    )
+    if duty["fore"] is not None:
+        lines.append(f"  duty factor      fore {duty['fore']:.4f}, hind {duty['hind']:.4f}")
+    energy = record["energy"]
+    if energy["relative_drift"] is not None:
+        lines.append(
+            f"  energy           {energy['initial']:.4f} J, balance closed to "
+            f"{energy['relative_drift']:.1e}"
+        )
+    return "\n".join(lines)
+
+
+def _line(label: str, value: float | None, unit: str) -> list[str]:
+    return [] if value is None else [f"  {label:<16} {value:.6f} {unit}"]
+
+
+def _shortened(phases: list[str], most: int = 12) -> str:
+    shown = " ".join(phases[:most])
+    return shown if len(phases) <= most else f"{shown} ... ({len(phases)} in all)"

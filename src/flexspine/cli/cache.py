@@ -1,0 +1,33 @@
+"""``flexspine cache``: compiled code kept between starts."""
+
+from __future__ import annotations
+
+import typer
+
+from flexspine.cli.options import Json
+from flexspine.cli.output import SCHEMA_VERSION, print_json
+
+app = typer.Typer(help="Compiled code kept between starts.", no_args_is_help=True)
+
+
+@app.command("clear")
+def clear(json: Json = False) -> None:
+    """Delete all compiled code; the next run compiles again.
+
+    Example:
+        flexspine cache clear
+    """
+    from flexspine.hybrid.cache import clear_cache
+
+    directory, freed = clear_cache()
+    if json:
+        print_json(
+            {"schema_version": SCHEMA_VERSION, "directory": str(directory), "freed_bytes": freed}
+        )
+    else:
+        print(f"cleared {directory} ({freed / 1e6:.1f} MB)")
+
+
+@app.callback()
+def _group() -> None:
+    pass

@@ -1,0 +1,63 @@
+"""What every verb says and how: JSON alone on stdout, messages on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from flexspine.errors import FlexspineError
+
+SCHEMA_VERSION = 1
+
+
+def print_json(record: dict[str, Any]) -> None:
+    """Print one JSON object; a NaN in it is a mistake of ours and raises."""
+    print(json.dumps(record, allow_nan=False))
+
+
+def fail(failure: FlexspineError, as_json: bool) -> int:
+    """Tell an error in one line, or as JSON, and return its exit code."""
+    if as_json:
+        print_json(
+            {
+                "schema_version": SCHEMA_VERSION,
+                "error": failure.code,
+                "message": failure.message,
+                "remedy": failure.remedy,
+            }
+        )
+    else:
+        print(f"flexspine: {failure.message}; {failure.remedy}", file=sys.stderr)
+    return failure.exit_code
+
+
+class Steps:
+    """Progress through named steps, shown only where a person watches."""
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress, self._task = progress, task
+
+    def begin(self, what: str) -> None:
+        """Start a step."""
+        self._progress.update(self._task, description=what, completed=0.0)
+
+    def at(self, share: float) -> None:
+        """Report how much of the step is done, from 0 to 1."""
+        self._progress.update(self._task, completed=share)
+
+
+@contextmanager
+def steps() -> Iterator[Steps]:
+    """Show progress on stderr while the block runs; nothing when stderr is not a terminal."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        yield Steps(bar, bar.add_task("", total=1.0))

@@ -1,0 +1,92 @@
+"""A directory of results, each file written whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import json
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from flexspine.cli.output import Steps
+from flexspine.errors import OutputError
+from flexspine.models.simulation import Run
+
+_OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+
+
+class ResultDirectory:
+    """A place for results; made and tried out at once, so that no run is done in vain.
+
+    Raises `OutputError` if it cannot be written to.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._new = [p for p in (path, *path.parents) if not p.exists()]
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=path):
+                pass
+        except OSError as failure:
+            self._remove_new()
+            if failure.errno in _OUT_OF_SPACE:
+                raise
+            raise OutputError(
+                f"cannot write to '{path}' ({failure.strerror})", "give --out another directory"
+            ) from None
+
+    def write(
+        self, run: Run, record: dict[str, Any], interval: float, animation: bool, progress: Steps
+    ) -> None:
+        """Write everything there is about a run."""
+        stage = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.path))
+        try:
+            _write_all(stage, run, record, interval, animation, progress)
+            for file in sorted(stage.iterdir()):
+                file.replace(self.path / file.name)
+        except BaseException:
+            shutil.rmtree(stage, ignore_errors=True)
+            self._remove_new()
+            raise
+        stage.rmdir()
+
+    def _remove_new(self) -> None:
+        """Take away directories made for nothing."""
+        for path in self._new:
+            try:
+                path.rmdir()
+            except OSError:
+                return
+
+
+def _write_all(
+    stage: Path,
+    run: Run,
+    record: dict[str, Any],
+    interval: float,
+    animation: bool,
+    progress: Steps,
+) -> None:
+    from flexspine.models.dataset import to_dataset
+    from flexspine.models.files import write_csv, write_events_csv, write_netcdf
+
+    progress.begin("writing data")
+    dataset = to_dataset(run, interval=interval)
+    write_netcdf(dataset, stage / "trajectory.nc")
+    write_csv(dataset, stage / "trajectory.csv")
+    write_events_csv(dataset, stage / "events.csv")
+    (stage / "summary.json").write_text(json.dumps(record, indent=2, allow_nan=False) + "\n")
+    if dataset.sizes["time"] < 2:
+        return  # nothing to draw
+    from flexspine.report.animation import animate, strip
+    from flexspine.report.figure import plot_run
+
+    progress.begin("drawing")
+    plot_run(dataset).savefig(stage / "figure.png")
+    strip(dataset).savefig(stage / "strip.png")
+    if animation:
+        for suffix in (".mp4", ".gif"):
+            progress.begin(f"animating {suffix}")
+            animate(dataset, stage / f"animation{suffix}", progress=progress.at)

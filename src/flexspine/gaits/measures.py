@@ -1,0 +1,133 @@
+"""Measures of a run: forces, duty factors, stride length, energies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from flexspine.hybrid.compile import Array
+from flexspine.hybrid.trajectory import Arc, HybridState
+from flexspine.models.dataset import sample, sample_times
+from flexspine.models.simulation import Run
+from flexspine.parameters import values
+
+SIDES = ("fore", "hind")
+
+# Forces are analytic within a step of the integrator and vary little there: this degree
+# represents them to rounding error.
+_DEGREE = 12
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The measures of a run. Lengths in m, times in s, forces in N per pair of legs, angles in rad.
+
+    Those of a stride (``period`` to ``froude``) are of the last completed one, or None. Peaks and
+    ``spine_range`` are over the whole run.
+    """
+
+    period: float | None
+    stride_length: float | None
+    stride_frequency: float | None
+    duty_factor: dict[str, float] | None
+    froude: float | None
+    distance: float
+    mean_speed: float | None
+    peak_grf: dict[str, float]
+    peak_grf_vertical: dict[str, float]
+    spine_range: tuple[float, float] | None
+    energy: dict[str, float | None]
+
+
+def summarize(run: Run) -> Summary:
+    """Measure a run.
+
+    ``froude`` is v^2 / (g l) with the mean speed of the stride and the mean rest length of the
+    legs; ``relative_drift`` the largest change of total plus dissipated energy over the initial.
+    """
+    trajectory = run.trajectory
+    given = values(run.model.parameters)
+    moved = float(trajectory.end.states[0] - trajectory.start.states[0])
+    stride = _last_stride(run)
+    period = length = froude = duty = None
+    if stride is not None:
+        period = stride[1].time - stride[0].time
+        length = float(stride[1].states[0] - stride[0].states[0])
+        leg = sum(given[f"{side}.leg.rest_length"] for side in SIDES) / 2
+        froude = (length / period) ** 2 / (given["gravity"] * leg)
+        duty = {side: _stance_time(run, side, *stride) / period for side in SIDES}
+    spine = None
+    if "spine.stiffness" in given and trajectory.arcs:
+        low, high = _extremes(run, "spine_angle")
+        spine = (low, high)
+    return Summary(
+        period=period,
+        stride_length=length,
+        stride_frequency=None if period is None else 1 / period,
+        duty_factor=duty,
+        froude=froude,
+        distance=moved,
+        mean_speed=moved / trajectory.duration if trajectory.duration > 0 else None,
+        peak_grf={side: _extremes(run, f"{side}_grf")[1] for side in SIDES},
+        peak_grf_vertical={side: _extremes(run, f"{side}_grf_y")[1] for side in SIDES},
+        spine_range=spine,
+        energy=_energy(run),
+    )
+
+
+def _last_stride(run: Run) -> tuple[HybridState, HybridState] | None:
+    points = run.section_points
+    return (points[-2], points[-1]) if len(points) > 1 else None
+
+
+def _stance_time(run: Run, side: str, start: HybridState, end: HybridState) -> float:
+    phases = ("FS", "DS") if side == "fore" else ("HS", "DS")
+    return sum(
+        min(arc.end, end.time) - max(arc.start, start.time)
+        for arc in run.trajectory.arcs
+        if arc.mode in phases and arc.end > start.time and arc.start < end.time
+    )
+
+
+def _extremes(run: Run, name: str) -> tuple[float, float]:
+    """Smallest and largest value of an observable over the run, to rounding error."""
+    pairs = [_arc_extremes(run, arc, name) for arc in run.trajectory.arcs]
+    if not pairs:
+        return 0.0, 0.0
+    return min(low for low, _ in pairs), max(high for _, high in pairs)
+
+
+def _arc_extremes(run: Run, arc: Arc, name: str) -> tuple[float, float]:
+    # Chebyshev points of the second kind hold the ends of each step.
+    nodes = chebyshev.chebpts2(_DEGREE + 1)
+    begin, step = arc.times[:-1], np.diff(arc.times)
+    times = (begin[:, None] + step[:, None] * (nodes + 1) / 2).ravel()
+    table = run.trajectory.observe(arc, arc(times))[name].reshape(len(step), -1)
+    low, high = float(table.min()), float(table.max())
+    spread = table.max(axis=1) - table.min(axis=1)
+    for row in np.flatnonzero((table.max(axis=1) > high - spread) & (spread > 0)):
+        high = max(high, _polished(nodes, table[row], 1.0))
+    for row in np.flatnonzero((table.min(axis=1) < low + spread) & (spread > 0)):
+        low = min(low, -_polished(nodes, table[row], -1.0))
+    return low, high
+
+
+def _polished(nodes: Array, samples: Array, sign: float) -> float:
+    """The largest value of ``sign`` times the interpolant of the samples."""
+    series = chebyshev.chebfit(nodes, sign * samples, _DEGREE)
+    turns = chebyshev.chebroots(chebyshev.chebder(series))
+    inside = turns.real[(np.abs(turns.imag) < 1e-9) & (np.abs(turns.real) <= 1)]
+    return float(max([*chebyshev.chebval(inside, series), *(sign * samples)]))
+
+
+def _energy(run: Run) -> dict[str, float | None]:
+    if not run.trajectory.arcs:
+        return {"initial": None, "relative_drift": None}
+    interval = max(run.trajectory.duration / 1000, 1e-9)
+    table = sample(run, sample_times(run, interval))
+    balance = table["total_energy"] + table["dissipated_energy"]
+    initial = float(balance[0])
+    drift = float(np.max(np.abs(balance - initial)))
+    return {"initial": initial, "relative_drift": drift / abs(initial) if initial else None}

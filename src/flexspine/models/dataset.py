@@ -1,0 +1,162 @@
+"""A run as an xarray Dataset: every quantity over time, with units and provenance."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexspine._version import __version__
+from flexspine.errors import ParameterError
+from flexspine.hybrid.compile import Array
+from flexspine.models.simulation import Run
+from flexspine.parameters import values
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+DEFAULT_INTERVAL = 1e-3
+
+# More samples than this are a slip of the pen (a GiB and more), not a wish.
+MAX_SAMPLES = 2_000_000
+
+_SIDE_VARIABLES = {
+    "toe_x": ("m", "horizontal position of the {} toe; in flight where touchdown would put it"),
+    "toe_y": ("m", "height of the {} toe; in flight of the leg held out for touchdown"),
+    "hip_x": ("m", "horizontal position of the {} hip"),
+    "hip_y": ("m", "height of the {} hip"),
+    "leg_length": ("m", "length of the {} leg"),
+    "leg_angle": ("rad", "angle of the {} leg from the vertical, foot ahead of the hip positive"),
+    "grf_x": ("N", "horizontal ground reaction force on the {} toe, per pair of legs"),
+    "grf_y": ("N", "vertical ground reaction force on the {} toe, per pair of legs"),
+    "grf": ("N", "magnitude of the ground reaction force on the {} toe, per pair of legs"),
+}
+
+VARIABLES: dict[str, tuple[str, str]] = {
+    "com_x": ("m", "horizontal position of the centre of mass"),
+    "com_y": ("m", "height of the centre of mass"),
+    "pitch": ("rad", "pitch of the body, nose up positive"),
+    "fore_pitch": ("rad", "pitch of the fore segment, nose up positive"),
+    "hind_pitch": ("rad", "pitch of the hind segment, nose up positive"),
+    "com_x_rate": ("m/s", "forward speed of the centre of mass"),
+    "com_y_rate": ("m/s", "vertical speed of the centre of mass"),
+    "pitch_rate": ("rad/s", "pitch rate of the body"),
+    "fore_pitch_rate": ("rad/s", "pitch rate of the fore segment"),
+    "hind_pitch_rate": ("rad/s", "pitch rate of the hind segment"),
+    **{
+        f"{side}_{name}": (unit, text.format(side))
+        for side in ("fore", "hind")
+        for name, (unit, text) in _SIDE_VARIABLES.items()
+    },
+    "spine_joint_x": ("m", "horizontal position of the spine joint"),
+    "spine_joint_y": ("m", "height of the spine joint"),
+    "spine_angle": ("rad", "fore pitch minus hind pitch"),
+    "spine_torque": ("N m", "torque of the spine on the hind segment, minus that on the fore one"),
+    "kinetic_energy": ("J", "kinetic energy"),
+    "gravity_energy": ("J", "potential energy of gravity, zero on the ground"),
+    "leg_energy": ("J", "elastic energy of both legs"),
+    "spine_energy": ("J", "elastic energy of the spine"),
+    "total_energy": ("J", "kinetic, gravity, leg and spine energy"),
+    "dissipated_energy": ("J", "energy lost in dampers since the start"),
+}
+
+PHASE_CODES = {"DF": 0, "FS": 1, "HS": 2, "DS": 3}
+
+
+def sample_times(run: Run, interval: float) -> Array:
+    """Return a regular grid of times over the run, the end included, in s.
+
+    Raises `ParameterError` for an interval that is not usable.
+    """
+    duration = run.trajectory.duration
+    if not (interval > 0 and duration / interval < MAX_SAMPLES):
+        raise ParameterError(
+            f"interval = {interval} s is not usable for a run of {duration:.6g} s",
+            f"give one that makes fewer than {MAX_SAMPLES} samples",
+        )
+    start, end = run.trajectory.start.time, run.trajectory.end.time
+    steps = np.arange(int(duration / interval) + 1, dtype=float)
+    grid: Array = start + interval * steps
+    return grid if grid[-1] >= end else np.append(grid, end)
+
+
+def sample(run: Run, times: Array) -> dict[str, Array]:
+    """Evaluate every quantity at sorted times (s) within the run, by name, each shape (times,).
+
+    The instant of an event belongs to the phase that follows. ``phase`` holds `PHASE_CODES`.
+    """
+    names = run.model.state_names
+    columns: dict[str, Array] = {}
+
+    def column(name: str) -> Array:
+        if name not in columns:
+            columns[name] = np.zeros(len(times))
+        return columns[name]
+
+    for arc, part in run.trajectory.pieces(times):
+        states = arc(times[part])
+        column("phase")[part] = PHASE_CODES[arc.mode]
+        for name, values_ in zip(names, states.T, strict=True):
+            column(name)[part] = values_
+        for name, values_ in run.trajectory.observe(arc, states).items():
+            column(name)[part] = values_
+    kinds = ("kinetic_energy", "gravity_energy", "leg_energy", "spine_energy")
+    columns["total_energy"] = sum((columns[kind] for kind in kinds), np.zeros(len(times)))
+    return columns
+
+
+def to_dataset(
+    run: Run, *, interval: float = DEFAULT_INTERVAL, times: Array | None = None
+) -> xr.Dataset:
+    """Return the run as a Dataset over ``time`` (s), every ``interval`` seconds or at ``times``.
+
+    ``phase`` is one of DF, FS, HS, DS. Events stand along ``event`` with ``event_time`` and
+    ``event_kind``. Attributes carry units, parameters, versions, tolerance and outcome. A run
+    that ended at its first instant has one sample at most. Raises `ParameterError`.
+    """
+    import xarray as xr
+
+    grid = sample_times(run, interval) if times is None else np.sort(np.asarray(times, float))
+    columns = sample(run, grid) if run.trajectory.arcs else {}
+    if not columns:
+        grid = grid[:0]
+        columns = {"phase": np.zeros(0)}
+    labels = np.array(list(PHASE_CODES))[columns.pop("phase").astype(int)]
+    data: dict[str, tuple[str, Array, dict[str, str]]] = {
+        name: ("time", column, {"units": VARIABLES[name][0], "long_name": VARIABLES[name][1]})
+        for name, column in columns.items()
+    }
+    events = run.trajectory.events
+    return xr.Dataset(
+        data_vars={
+            **data,
+            "phase": ("time", labels, {"long_name": "contact phase", "values": "DF FS HS DS"}),
+            "event_time": ("event", np.array([e.time for e in events]), {"units": "s"}),
+            "event_kind": ("event", np.array([" + ".join(e.names) for e in events], dtype=str)),
+        },
+        coords={"time": ("time", grid, {"units": "s", "long_name": "time"})},
+        attrs=_attributes(run),
+    )
+
+
+def _attributes(run: Run) -> dict[str, str | float]:
+    import heyoka
+
+    model = run.model
+    return {
+        "title": f"{model.name}: {model.source.title}",
+        "model": model.kind.name,
+        "preset": model.name,
+        "citation": model.source.citation,
+        "parameters": json.dumps(values(model.parameters)),
+        "touchdown_angles": json.dumps(dict(model.touchdown)),
+        "apex": json.dumps(dict(model.apex)),
+        "provenance": json.dumps(dict(model.source.provenance)),
+        "outcome": run.outcome.name,
+        "message": run.outcome.message,
+        "tolerance": run.tolerance,
+        "flexspine_version": __version__,
+        "heyoka_version": heyoka.__version__,
+        "conventions": "SI and radians; x forward, y up, angles counter-clockwise",
+    }

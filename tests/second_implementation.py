@@ -1,0 +1,395 @@
+"""A second, independent implementation of the two bounding templates, for comparison only.
+
+Nothing here comes from the package under test, and the method differs on purpose. The body is a
+base point (the spine joint, or the fore hip of a rigid body) that carries links: the coordinates
+are the base point and the absolute angles of the links. Mass matrix and velocity terms are summed
+numerically from the Jacobians of the segments' centres of mass, leg forces enter by virtual work
+at the hips, and SciPy's DOP853 integrates from event to event. SI units, radians, x forward, y up.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+State = NDArray[np.float64]
+Gauge = Callable[[State], float]
+Field = Callable[[State], State]
+
+SAME_TIME = 1e-12  # s; guards closer together than this are one event
+WINDOW = 0.02  # s; how far one call of the integrator goes before guards are looked at
+MAX_STEP = 0.01  # s
+DIFFERENCE = 1e-6  # s; half-width of the central difference along the flow
+LONGEST = 60.0  # s; the limit of a run for which none is given
+LEGS = ("fore", "hind")
+PHASES = {(): "DF", ("fore",): "FS", ("hind",): "HS", ("fore", "hind"): "DS"}
+
+
+@dataclass(frozen=True)
+class Half:
+    """One segment of the flexible body, with its leg pair."""
+
+    mass: float
+    inertia: float
+    spine_offset: float
+    hip_offset: float
+    leg_stiffness: float
+    leg_damping: float
+    leg_rest_length: float
+
+
+@dataclass(frozen=True)
+class Flexible:
+    """Two segments joined by a torsional spring-damper."""
+
+    fore: Half
+    hind: Half
+    spine_stiffness: float
+    spine_damping: float
+    spine_rest_angle: float
+    gravity: float
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """One body; hips at given distances from its centre of mass; legs are (k, c, l0)."""
+
+    mass: float
+    inertia: float
+    fore_hip: float
+    hind_hip: float
+    fore_leg: tuple[float, float, float]
+    hind_leg: tuple[float, float, float]
+    gravity: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """One run: how and when it ended, what happened on the way, and the last state."""
+
+    ended: str
+    time: float
+    phases: list[str]
+    events: list[tuple[float, str]]
+    end: dict[str, float]
+    peak_grf: dict[str, float]
+    peak_vertical_grf: dict[str, float]
+    energy_start: float
+    energy_end: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """A rigid segment: its centre of mass lies at `arm` along link `link` from the base point."""
+
+    mass: float
+    inertia: float
+    arm: float
+    link: int
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg pair; its hip lies at `arm` along link `link` from the base point."""
+
+    arm: float
+    link: int
+    stiffness: float
+    damping: float
+    rest_length: float
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Fires when `value` falls through zero, having been positive before."""
+
+    name: str
+    value: Gauge
+
+
+class Linkage:
+    """Equations of motion in (base x, base y, link angles) and their rates."""
+
+    def __init__(self, body: Flexible | Rigid) -> None:
+        self.gravity = body.gravity
+        self.spine: tuple[float, float, float] | None = None
+        if isinstance(body, Flexible):
+            f, h = body.fore, body.hind
+            self.parts = [
+                Part(f.mass, f.inertia, f.spine_offset, 0),
+                Part(h.mass, h.inertia, -h.spine_offset, 1),
+            ]
+            self.legs = {
+                name: Leg(
+                    sign * (half.spine_offset + half.hip_offset),
+                    link,
+                    half.leg_stiffness,
+                    half.leg_damping,
+                    half.leg_rest_length,
+                )
+                for name, half, sign, link in (("fore", f, 1, 0), ("hind", h, -1, 1))
+            }
+            self.spine = (body.spine_stiffness, body.spine_damping, body.spine_rest_angle)
+            self.pitch_keys = ["fore_pitch", "hind_pitch"]
+        else:
+            self.parts = [Part(body.mass, body.inertia, -body.fore_hip, 0)]
+            self.legs = {
+                "fore": Leg(0.0, 0, *body.fore_leg),
+                "hind": Leg(-body.fore_hip - body.hind_hip, 0, *body.hind_leg),
+            }
+            self.pitch_keys = ["pitch"]
+        self.n = 2 + len(self.pitch_keys)
+        self.mass = sum(part.mass for part in self.parts)
+
+    def place(self, s: State, arm: float, link: int) -> tuple[float, float]:
+        """Position of a point of a link."""
+        angle = s[2 + link]
+        return s[0] + arm * math.cos(angle), s[1] + arm * math.sin(angle)
+
+    def velocity(self, s: State, arm: float, link: int) -> tuple[float, float]:
+        """Velocity of a point of a link."""
+        angle, turn = s[2 + link], arm * s[self.n + 2 + link]
+        return s[self.n] - turn * math.sin(angle), s[self.n + 1] + turn * math.cos(angle)
+
+    def jacobian(self, s: State, arm: float, link: int) -> NDArray[np.float64]:
+        """Derivative of `place` with respect to the coordinates."""
+        jac = np.zeros((2, self.n))
+        jac[0, 0] = jac[1, 1] = 1.0
+        jac[0, 2 + link] = -arm * math.sin(s[2 + link])
+        jac[1, 2 + link] = arm * math.cos(s[2 + link])
+        return jac
+
+    def com(self, s: State) -> tuple[float, float, float, float]:
+        """Position and velocity of the whole body's centre of mass."""
+        total = np.zeros(4)
+        for p in self.parts:
+            at = (*self.place(s, p.arm, p.link), *self.velocity(s, p.arm, p.link))
+            total += p.mass * np.array(at)
+        x, y, vx, vy = (total / self.mass).tolist()
+        return x, y, vx, vy
+
+    def leg(self, s: State, name: str, toe: float) -> tuple[float, float, float, float, float]:
+        """Force, unit vector from toe to hip (two numbers), length and its rate."""
+        leg = self.legs[name]
+        x, y = self.place(s, leg.arm, leg.link)
+        vx, vy = self.velocity(s, leg.arm, leg.link)
+        length = math.hypot(x - toe, y)
+        ux, uy = (x - toe) / length, y / length
+        rate = ux * vx + uy * vy
+        force = leg.stiffness * (leg.rest_length - length) - leg.damping * rate
+        return force, ux, uy, length, rate
+
+    def field(self, toes: dict[str, float]) -> Field:
+        """The vector field with these toes on the ground."""
+        n = self.n
+
+        def rates(s: State) -> State:
+            inertia = np.zeros((n, n))
+            load = np.zeros(n)
+            for p in self.parts:
+                jac = self.jacobian(s, p.arm, p.link)
+                angle, turn = s[2 + p.link], s[n + 2 + p.link]
+                # Jdot qdot: the centripetal acceleration of the part about the base point.
+                drift = -p.arm * turn**2 * np.array([math.cos(angle), math.sin(angle)])
+                inertia += p.mass * (jac.T @ jac)
+                inertia[2 + p.link, 2 + p.link] += p.inertia
+                load -= p.mass * (jac.T @ (drift + np.array([0.0, self.gravity])))
+            if self.spine is not None:
+                k, c, rest = self.spine
+                moment = -k * (s[2] - s[3] - rest) - c * (s[n + 2] - s[n + 3])
+                load[2] += moment
+                load[3] -= moment
+            for name, toe in toes.items():
+                force, ux, uy, _, _ = self.leg(s, name, toe)
+                jac = self.jacobian(s, self.legs[name].arm, self.legs[name].link)
+                load += force * (jac.T @ np.array([ux, uy]))
+            return np.concatenate([s[n:], np.linalg.solve(inertia, load)])
+
+        return rates
+
+    def energy(self, s: State, toes: dict[str, float]) -> float:
+        """Kinetic, gravitational, spine and stance-leg spring energy."""
+        total = 0.0
+        for p in self.parts:
+            vx, vy = self.velocity(s, p.arm, p.link)
+            total += 0.5 * p.mass * (vx**2 + vy**2)
+            total += 0.5 * p.inertia * s[self.n + 2 + p.link] ** 2
+            total += p.mass * self.gravity * self.place(s, p.arm, p.link)[1]
+        if self.spine is not None:
+            total += 0.5 * self.spine[0] * (s[2] - s[3] - self.spine[2]) ** 2
+        for name, toe in toes.items():
+            leg = self.legs[name]
+            total += 0.5 * leg.stiffness * (leg.rest_length - self.leg(s, name, toe)[3]) ** 2
+        return float(total)
+
+    def pack(self, apex: dict[str, float]) -> State:
+        """State from the apex quantities; the centre of mass is at x = 0."""
+        s = np.zeros(2 * self.n)
+        for i, key in enumerate(self.pitch_keys):
+            s[2 + i], s[self.n + 2 + i] = apex[key], apex[key + "_rate"]
+        x, y, vx, vy = self.com(s)
+        s[0], s[1] = -x, apex["height"] - y
+        s[self.n], s[self.n + 1] = apex["speed"] - vx, apex.get("climb", 0.0) - vy
+        return s
+
+    def unpack(self, s: State) -> dict[str, float]:
+        """The apex quantities of a state, with distance and climb."""
+        x, y, vx, vy = self.com(s)
+        out = {"height": y, "speed": vx, "distance": x, "climb": vy}
+        for i, key in enumerate(self.pitch_keys):
+            out[key], out[key + "_rate"] = float(s[2 + i]), float(s[self.n + 2 + i])
+        return out
+
+    def hip_height(self, s: State, name: str) -> float:
+        """Height of a hip."""
+        return self.place(s, self.legs[name].arm, self.legs[name].link)[1]
+
+    def clearance(self, s: State) -> float:
+        """Height of the lowest point that must not touch the ground."""
+        return min(float(s[1]), self.com(s)[1], *(self.hip_height(s, name) for name in LEGS))
+
+    def pulls(self, s: State, name: str, toe: float) -> bool:
+        """Whether this leg, on the ground, would pull now or at once after."""
+        force, _, _, _, rate = self.leg(s, name, toe)
+        leg = self.legs[name]
+        if abs(force) <= 1e-12 * leg.stiffness * leg.rest_length:
+            return rate > 0.0
+        return force < 0.0
+
+
+def slope(gauge: Gauge, s: State, ds: State) -> float:
+    """Rate of a gauge along the flow, by a central difference."""
+    step = DIFFERENCE * ds
+    return (gauge(s + step) - gauge(s - step)) / (2.0 * DIFFERENCE)
+
+
+class Flow:
+    """One integration from a state over a span, with its nodes and dense output."""
+
+    def __init__(self, field: Field, s: State, span: float, rtol: float, atol: float) -> None:
+        self.field, self.rtol, self.atol = field, rtol, atol
+        run: Any = solve_ivp(
+            lambda _, state: field(state),
+            (0.0, span),
+            s,
+            method="DOP853",
+            rtol=rtol,
+            atol=atol,
+            max_step=MAX_STEP,
+            dense_output=True,
+        )
+        self.success: bool = run.success
+        self.times: list[float] = run.t.tolist()
+        self.states: list[State] = list(run.y.T)
+        self.dense: Callable[[float], State] = run.sol
+
+    def turning_point(self, gauge: Gauge, left: float, right: float) -> tuple[float, float]:
+        """Time and value of a gauge's extremum between two times with slopes of unlike sign."""
+
+        def steepness(t: float) -> float:
+            s = self.dense(t)
+            return slope(gauge, s, self.field(s))
+
+        if steepness(left) * steepness(right) >= 0.0:  # the extremum is at an end
+            return max(((t, gauge(self.dense(t))) for t in (left, right)), key=lambda e: abs(e[1]))
+        t = float(brentq(steepness, left, right, xtol=1e-12))
+        return t, gauge(self.dense(t))
+
+    def root(self, gauge: Gauge, left: float, right: float) -> float:
+        """Zero of a gauge on the dense output, where it falls between two times."""
+
+        def value(t: float) -> float:
+            return gauge(self.dense(t))
+
+        if value(left) <= 0.0:
+            return left
+        if value(right) >= 0.0:
+            return right
+        return float(brentq(value, left, right, xtol=1e-14))
+
+    def polish(self, gauge: Gauge, k: int, guess: float) -> tuple[float, State]:
+        """Zero of a gauge after node k by Newton steps on newly integrated states."""
+        left, right = self.times[k], self.times[k + 1]
+        t, s = left, self.states[k]
+        move = guess - left
+        for _ in range(10):
+            s = self.shift(s, move)
+            t += move
+            ds = self.field(s)
+            rate = slope(gauge, s, ds)
+            if rate >= 0.0:  # grazing: keep what the dense output says
+                break
+            move = min(max(t - gauge(s) / rate, left), right) - t
+            if abs(move) < 1e-14:
+                s, t = s + move * ds, t + move
+                break
+        return t, s
+
+    def shift(self, s: State, span: float) -> State:
+        """Carry a state along the flow by a (possibly tiny or negative) time."""
+        if abs(span) < 1e-10:
+            return s + span * self.field(s)
+        return Flow(self.field, s, span, self.rtol, self.atol).states[-1]
+
+
+def is_above(gauge: Gauge, s: State, ds: State) -> bool:
+    """Whether a gauge is positive; on zero, whether it is about to be."""
+    value, rate = gauge(s), slope(gauge, s, ds)
+    return rate > 0.0 if abs(value) <= SAME_TIME * abs(rate) else value > 0.0
+
+
+def brackets(flow: Flow, guard: Guard, k: int, above: bool) -> Iterator[tuple[float, float]]:
+    """Intervals between nodes k and k + 1 in which a guard falls through zero."""
+    left, right = flow.times[k], flow.times[k + 1]
+    s0, s1 = flow.states[k], flow.states[k + 1]
+    below = guard.value(s1) <= 0.0
+    if above and below:
+        yield left, right
+        return
+    if above == below:  # it rises through zero: no event
+        return
+    # Same side at both nodes: look at an extremum on the way, lest two crossings be missed.
+    rate0 = slope(guard.value, s0, flow.field(s0))
+    rate1 = slope(guard.value, s1, flow.field(s1))
+    if above and rate0 < 0.0 < rate1:
+        turn, value = flow.turning_point(guard.value, left, right)
+        if value <= 0.0:
+            yield left, turn
+    elif not above and rate0 > 0.0 > rate1:
+        turn, value = flow.turning_point(guard.value, left, right)
+        if value > 0.0:
+            yield turn, right
+
+
+def first_event(
+    flow: Flow, guards: list[Guard], above: list[bool]
+) -> tuple[int, float, State, list[str]] | None:
+    """Node before the first event, its time and state and the guards that fire.
+
+    `above` says which guards are positive at the first node; it is updated to the last.
+    """
+    for k in range(len(flow.times) - 1):
+        found = [
+            flow.polish(guard.value, k, flow.root(guard.value, *bracket))
+            for guard, up in zip(guards, above, strict=True)
+            for bracket in brackets(flow, guard, k, up)
+        ]
+        if found:
+            t, s = min(found, key=lambda event: event[0])
+            ds = flow.field(s)
+            fired = []
+            for guard, up in zip(guards, above, strict=True):
+                rate = slope(guard.value, s, ds)
+                soon = abs(guard.value(s)) <= SAME_TIME * abs(rate) and rate < 0.0
+                chosen = any(hit[0] - t <= SAME_TIME for hit in found) and len(found) == 1
+                only = chosen and any(True for _ in brackets(flow, guard, k, up))
+                if (up and soon) or only:
+                    fired.append(guard.name)
+            return k, t, s, fired
+        above[:] = [guard.value(flow.states[k + 1]) > 0.0 for guard in guards]
+    return None
