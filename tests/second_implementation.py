@@ -182,7 +182,7 @@ class Linkage:
         ux, uy = (x - toe) / length, y / length
         rate = ux * vx + uy * vy
         force = leg.stiffness * (leg.rest_length - length) - leg.damping * rate
-        return force, ux, uy, length, rate
+        return float(force), float(ux), float(uy), length, float(rate)
 
     def field(self, toes: dict[str, float]) -> Field:
         """The vector field with these toes on the ground."""
@@ -295,8 +295,8 @@ class Flow:
             s = self.dense(t)
             return slope(gauge, s, self.field(s))
 
-        if steepness(left) * steepness(right) >= 0.0:  # the extremum is at an end
-            return max(((t, gauge(self.dense(t))) for t in (left, right)), key=lambda e: abs(e[1]))
+        if steepness(left) * steepness(right) >= 0.0:  # one of them is zero to rounding
+            return left, gauge(self.dense(left))
         t = float(brentq(steepness, left, right, xtol=1e-12))
         return t, gauge(self.dense(t))
 
@@ -368,28 +368,206 @@ def brackets(flow: Flow, guard: Guard, k: int, above: bool) -> Iterator[tuple[fl
 
 def first_event(
     flow: Flow, guards: list[Guard], above: list[bool]
-) -> tuple[int, float, State, list[str]] | None:
-    """Node before the first event, its time and state and the guards that fire.
+) -> tuple[int, float, State, set[str]] | None:
+    """Node before the first event, its time and state and the names of the guards that fire.
 
     `above` says which guards are positive at the first node; it is updated to the last.
     """
     for k in range(len(flow.times) - 1):
-        found = [
-            flow.polish(guard.value, k, flow.root(guard.value, *bracket))
-            for guard, up in zip(guards, above, strict=True)
-            for bracket in brackets(flow, guard, k, up)
-        ]
+        found: dict[int, tuple[float, State]] = {}
+        for i, guard in enumerate(guards):
+            for bracket in brackets(flow, guard, k, above[i]):
+                found[i] = flow.polish(guard.value, k, flow.root(guard.value, *bracket))
         if found:
-            t, s = min(found, key=lambda event: event[0])
+            t, s = min(found.values(), key=lambda event: event[0])
             ds = flow.field(s)
-            fired = []
-            for guard, up in zip(guards, above, strict=True):
-                rate = slope(guard.value, s, ds)
-                soon = abs(guard.value(s)) <= SAME_TIME * abs(rate) and rate < 0.0
-                chosen = any(hit[0] - t <= SAME_TIME for hit in found) and len(found) == 1
-                only = chosen and any(True for _ in brackets(flow, guard, k, up))
-                if (up and soon) or only:
-                    fired.append(guard.name)
+            fired = set()
+            for i, guard in enumerate(guards):
+                if i in found:
+                    wait = found[i][0] - t
+                elif above[i] and (rate := slope(guard.value, s, ds)) < 0.0:
+                    wait = -guard.value(s) / rate
+                else:
+                    continue
+                if wait <= SAME_TIME:
+                    fired.add(guard.name)
             return k, t, s, fired
         above[:] = [guard.value(flow.states[k + 1]) > 0.0 for guard in guards]
     return None
+
+
+def highest(flow: Flow, gauge: Gauge, k: int, t: float, s: State) -> float:
+    """Largest value of a gauge along a flow, over its nodes up to k and on to state s at time t."""
+    times = [*flow.times[: k + 1], t]
+    states = [*flow.states[: k + 1], s]
+    rates = [slope(gauge, state, flow.field(state)) for state in states]
+    best = max(gauge(state) for state in states)
+    for i in range(len(times) - 1):
+        if rates[i] > 0.0 > rates[i + 1]:
+            best = max(best, flow.turning_point(gauge, times[i], times[i + 1])[1])
+    return best
+
+
+class Run:
+    """A run in progress: the state, the legs on the ground and the record so far."""
+
+    def __init__(
+        self, body: Flexible | Rigid, apex: dict[str, float], touchdown: dict[str, float]
+    ) -> None:
+        self.linkage = Linkage(body)
+        self.touchdown = touchdown
+        self.state = self.linkage.pack(apex)
+        self.time = 0.0
+        self.toes: dict[str, float] = {}
+        self.had_stance: set[str] = set()
+        self.phases: list[str] = []
+        self.events: list[tuple[float, str]] = []
+        self.peaks = dict.fromkeys(LEGS, 0.0)
+        self.vertical_peaks = dict.fromkeys(LEGS, 0.0)
+
+    def land(self, name: str, toe: float) -> None:
+        """Put a leg on the ground; if it would pull it leaves again at once."""
+        self.had_stance.add(name)
+        if self.linkage.pulls(self.state, name, toe):
+            self.events.append((self.time, f"{name} lift-off"))
+        else:
+            self.toes[name] = toe
+
+    def note_phase(self) -> None:
+        """Record the phase unless it is still the same."""
+        phase = PHASES[tuple(name for name in LEGS if name in self.toes)]
+        if not self.phases or self.phases[-1] != phase:
+            self.phases.append(phase)
+
+    def apex_may_come(self) -> bool:
+        """Whether the section is armed."""
+        return not self.toes and len(self.had_stance) == len(LEGS)
+
+    def guards(self) -> list[Guard]:
+        """Everything that can happen in this phase."""
+        link = self.linkage
+        toes = dict(self.toes)
+
+        def landing(name: str) -> Gauge:
+            height = link.legs[name].rest_length * math.cos(self.touchdown[name])
+            return lambda s: link.hip_height(s, name) - height
+
+        def force(name: str) -> Gauge:
+            return lambda s: link.leg(s, name, toes[name])[0]
+
+        def hip(name: str) -> Gauge:
+            return lambda s: link.hip_height(s, name)
+
+        out = [
+            Guard(f"{name} lift-off", force(name))
+            if name in toes
+            else Guard(f"{name} touchdown", landing(name))
+            for name in LEGS
+        ]
+        out += [Guard("fall", hip(name)) for name in LEGS]
+        out += [Guard("fall", lambda s: float(s[1])), Guard("fall", lambda s: link.com(s)[1])]
+        if self.apex_may_come():
+            out.append(Guard("apex", lambda s: link.com(s)[3]))
+        return out
+
+    def record_peaks(self, flow: Flow, k: int, t: float, s: State) -> None:
+        """Update the peak forces with a flow up to state s at time t after node k."""
+        link = self.linkage
+        for name, toe in self.toes.items():
+
+            def force(s: State, name: str = name, toe: float = toe) -> float:
+                return link.leg(s, name, toe)[0]
+
+            def vertical(s: State, name: str = name, toe: float = toe) -> float:
+                f, _, uy, _, _ = link.leg(s, name, toe)
+                return f * uy
+
+            self.peaks[name] = max(self.peaks[name], highest(flow, force, k, t, s))
+            self.vertical_peaks[name] = max(
+                self.vertical_peaks[name], highest(flow, vertical, k, t, s)
+            )
+
+    def phase(self, limit: float, rtol: float, atol: float) -> set[str]:
+        """Run to the next event and return what fired; nothing if the limit came first."""
+        field = self.linkage.field(dict(self.toes))
+        guards = self.guards()
+        ds = field(self.state)
+        above = [is_above(guard.value, self.state, ds) for guard in guards]
+        while self.time < limit:
+            span = min(WINDOW, limit - self.time)
+            flow = Flow(field, self.state, span, rtol, atol)
+            event = first_event(flow, guards, above)
+            if event is not None:
+                k, t, self.state, fired = event
+                self.record_peaks(flow, k, t, self.state)
+                self.time += float(t)
+                return fired
+            if not flow.success:
+                raise RuntimeError("the integrator gave up")
+            self.state = flow.states[-1]
+            self.record_peaks(flow, len(flow.times) - 2, span, self.state)
+            self.time = limit if span < WINDOW else self.time + span
+        return set()
+
+    def switch(self, fired: set[str]) -> None:
+        """Apply lift-offs and touchdowns that happen together."""
+        for name in LEGS:
+            if f"{name} lift-off" in fired:
+                self.events.append((self.time, f"{name} lift-off"))
+                del self.toes[name]
+            elif f"{name} touchdown" in fired:
+                self.events.append((self.time, f"{name} touchdown"))
+                leg = self.linkage.legs[name]
+                x = self.linkage.place(self.state, leg.arm, leg.link)[0]
+                self.land(name, x + leg.rest_length * math.sin(self.touchdown[name]))
+
+    def go(self, limit: float, rtol: float, atol: float) -> str:
+        """Run to the end and say what ended it."""
+        if self.linkage.clearance(self.state) <= 0.0:
+            return "fell"
+        while self.time < limit:
+            fired = self.phase(limit, rtol, atol)
+            if "fall" in fired:
+                return "fell"
+            if "apex" in fired:
+                return "apex"
+            self.switch(fired)
+            self.note_phase()
+            climb = self.linkage.com(self.state)[3]
+            if fired and self.apex_may_come() and abs(climb) <= SAME_TIME * self.linkage.gravity:
+                return "apex"
+        return "time"
+
+
+def stride(
+    body: Flexible | Rigid,
+    apex: dict[str, float],
+    touchdown: dict[str, float],
+    *,
+    contacts: dict[str, float] | None = None,
+    rtol: float = 1e-13,
+    atol: float = 1e-13,
+    until: float | None = None,
+) -> Result:
+    """Run from a start state to the first apex section, a fall or `until` seconds.
+
+    `apex` holds the start (optionally with "climb", the vertical speed), `touchdown` the angles of
+    the legs, `contacts` the toes of legs that start on the ground.
+    """
+    run = Run(body, apex, touchdown)
+    for name, toe in (contacts or {}).items():
+        run.land(name, toe)
+    run.note_phase()
+    energy_start = run.linkage.energy(run.state, run.toes)
+    ended = run.go(LONGEST if until is None else until, rtol, atol)
+    return Result(
+        ended=ended,
+        time=run.time,
+        phases=run.phases,
+        events=run.events,
+        end=run.linkage.unpack(run.state),
+        peak_grf=run.peaks,
+        peak_vertical_grf=run.vertical_peaks,
+        energy_start=energy_start,
+        energy_end=run.linkage.energy(run.state, run.toes),
+    )

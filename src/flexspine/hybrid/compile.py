@@ -136,7 +136,7 @@ class CompiledSystem:
         """Compile the folded expressions as a function of the parameters."""
         variables = {s: hy.expression(f"p{i}") for i, s in enumerate(self.system.parameters)}
         lower = Lowering(variables, (), {}, 0)
-        return hy.cfunc([lower(e) for e in expressions], vars=list(variables.values()))
+        return _function([lower(e) for e in expressions], list(variables.values()))
 
     def _event_kernel(self, mode: Mode) -> tuple[Any, tuple[Jump, ...]]:
         system = self.system
@@ -185,7 +185,12 @@ class CompiledSystem:
         return Lowering({**self._states, **self._held, **self._raw}, (), definitions, 0)
 
     def _function(self, outputs: list[Any]) -> Any:
-        return hy.cfunc(outputs, vars=list(self._states.values()))
+        return _function(outputs, list(self._states.values()))
+
+
+def _function(outputs: list[Any], variables: list[Any]) -> Any:
+    """Compile expressions; a function of nothing or to nothing gets one zero to work on."""
+    return hy.cfunc(outputs or [hy.expression(0.0)], vars=variables or [hy.expression("unused")])
 
 
 def _due(mode: Mode, before: Mode) -> tuple[Due, ...]:
@@ -211,7 +216,8 @@ class BoundMode:
     def __init__(self, code: CompiledMode, n_held: int, parameters: Array) -> None:
         self.code = code
         room = np.zeros(n_held)
-        numbers = np.concatenate([room, code.coefficients(parameters)])
+        folded = code.coefficients(parameters) if parameters.size else np.zeros(0)
+        numbers = np.concatenate([room, folded])
         self._numbers = numbers[: code.numbers.size]
         self._inputs = np.concatenate([room, parameters])[: code.kernel.nparams]
         self._answer = np.empty(code.kernel.nouts)
@@ -230,7 +236,8 @@ class BoundMode:
         code.state[:] = states
         integrator = code.integrator
         integrator.time = time
-        integrator.reset_cooldowns()
+        if code.jumps:
+            integrator.reset_cooldowns()
         return integrator
 
     def evaluate(self, states: Array, held: Array) -> Array:

@@ -134,9 +134,10 @@ class _Run:
                 return
 
     def _advance(self, integrator: Any, limit: float) -> Any:
+        if self.steps_left <= 0:
+            return hy.taylor_outcome.step_limit
         result, _, _, steps, _, _ = integrator.propagate_until(limit, max_steps=self.steps_left)
-        self.steps += steps
-        self.steps_left = max(self.steps_left - steps, 1)
+        self._count(steps)
         return result
 
     def _advance_recording(self, integrator: Any, limit: float) -> Any:
@@ -144,18 +145,21 @@ class _Run:
         times, series = [integrator.time], []
         result = hy.taylor_outcome.success
         while result == hy.taylor_outcome.success:
-            if self.steps_left == 0:
+            if self.steps_left <= 0:
                 result = hy.taylor_outcome.step_limit
                 break
             result, step = integrator.step(limit - integrator.time, write_tc=True)
-            self.steps += 1
-            self.steps_left -= 1
+            self._count(1)
             if step > 0:
                 times.append(integrator.time)
                 series.append(integrator.tc.copy())
         if series:
             self._keep(Arc(self.mode, self.held, np.array(times), np.array(series)))
         return result
+
+    def _count(self, steps: int) -> None:
+        self.steps += steps
+        self.steps_left -= steps
 
     def _keep(self, arc: Arc) -> None:
         """Keep an arc; if a guard touches zero within it without crossing, end the run there."""

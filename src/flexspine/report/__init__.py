@@ -1,0 +1,1 @@
+"""Pictures of runs: figures over time, strips of postures, animations. Nothing is simulated here."""

@@ -1,0 +1,290 @@
+"""A run over time: height, pitch, forces, energies and phases in one figure."""
+
+from __future__ import annotations
+
+import json
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from flexspine.report.style import (
+    ENERGY_COLORS,
+    FAINT,
+    INK,
+    PHASE_COLORS,
+    SIDE_COLORS,
+    SMALL_SIZE,
+    TITLE_SIZE,
+    themed,
+)
+from flexspine.report.timeline import (
+    PHASE_NAMES,
+    Span,
+    check_samples,
+    draw_phase_bar,
+    label_phases,
+    phase_spans,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+SIDES = ("fore", "hind")
+
+# More lines than this would hide the curves: only apexes are drawn, then none.
+MAX_EVENT_LINES = 80
+
+LINE = 0.175  # in; from one line of the title to the next
+
+
+def plot_run(dataset: xr.Dataset) -> Figure:
+    """Draw a run: CoM height, pitch, ground reaction forces, energy shares and phases.
+
+    Raises `InputError` for a dataset without samples.
+    """
+    check_samples(dataset)
+    with themed():
+        time = dataset["time"].values
+        spans = phase_spans(dataset)
+        details = describe(dataset)
+        title = 0.38 + LINE * len(details)
+        width = float(np.clip(7.4 + 0.1 * (len(spans) - 20), 7.4, 12.0))
+        figure = Figure(figsize=(width, 8.2 + title), layout="constrained")
+        bar, *panels = figure.subplots(
+            6, 1, sharex=True, height_ratios=[0.24, 1, 1, 1.2, 1.15, 0.95]
+        )
+        draw_phase_bar(bar, spans, (float(time[0]), float(time[-1])))
+        bar.tick_params(bottom=False)
+        height, pitch, forces, energy, elastic = panels
+        _draw_height(height, dataset)
+        _draw_pitch(pitch, dataset)
+        _draw_forces(forces, dataset)
+        _draw_energy(energy, elastic, dataset)
+        _draw_events(panels, dataset)
+        elastic.set_xlabel("time (s)")
+        figure.align_ylabels(panels)
+        _add_key(figure, dataset, spans)
+        _add_title(figure, dataset, details, title)
+        figure.draw_without_rendering()
+        label_phases(bar, spans, bar.get_position().width * width)
+    return figure
+
+
+def describe(dataset: xr.Dataset) -> list[str]:
+    """Return what a reader must know about a run, in lines: parameters, energy, outcome."""
+    given: dict[str, Any] = json.loads(dataset.attrs.get("parameters", "{}"))
+    parts = []
+    if "spine.stiffness" in given:
+        parts.append(f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad")
+        if given.get("spine.damping"):
+            parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
+    parts += _of_legs(given, "stiffness", "N/m per leg pair")
+    if any(given.get(f"{side}.leg.damping") for side in SIDES):
+        parts += _of_legs(given, "damping", "N s/m per leg pair")
+    angles = json.loads(dataset.attrs.get("touchdown_angles", "{}"))
+    if angles:
+        both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
+        parts.append(f"touchdown angles: {both}")
+    parts.append(f"energy at the start {float(dataset['total_energy'][0]):.4g} J")
+    duration = float(dataset["time"][-1] - dataset["time"][0])
+    if duration > 0:
+        moved = float(dataset["com_x"][-1] - dataset["com_x"][0])
+        parts.append(f"mean speed {moved / duration:.3g} m/s")
+    return _joined(parts)
+
+
+def _of_legs(given: dict[str, Any], what: str, unit: str) -> list[str]:
+    fore, hind = (given.get(f"{side}.leg.{what}") for side in SIDES)
+    if fore is None or hind is None:
+        return []
+    value = f"= {fore:g}" if fore == hind else f"fore {fore:g}, hind {hind:g}"
+    return [f"leg {what} {value} {unit}"]
+
+
+def _joined(parts: list[str], limit: int = 100) -> list[str]:
+    """Fill lines with whole parts."""
+    lines: list[str] = []
+    for part in parts:
+        if lines and len(lines[-1]) + len(part) + 3 <= limit:
+            lines[-1] += f"  ·  {part}"
+        else:
+            lines.append(part)
+    return lines
+
+
+def heading(dataset: xr.Dataset) -> str:
+    """Return the name of what ran; a preset whose values were changed says so."""
+    attrs = dataset.attrs
+    name = f"{attrs.get('preset', 'run')}: {attrs.get('model', 'bounder').replace('-', ' ')}"
+    origins = json.loads(attrs.get("provenance", "{}"))
+    changed = [what for what, origin in origins.items() if origin == "set by user"]
+    if not changed:
+        return name
+    return f"{name}, with own " + (", ".join(changed) if len(changed) < 4 else "values")
+
+
+def ending(dataset: xr.Dataset) -> str | None:
+    """Return how a run ended early, or None if it completed."""
+    outcome = dataset.attrs.get("outcome", "completed")
+    if outcome == "completed":
+        return None
+    return f"{outcome.replace('_', ' ')}: {dataset.attrs.get('message', '')}"
+
+
+def _add_title(figure: Figure, dataset: xr.Dataset, details: list[str], height: float) -> None:
+    total = figure.get_size_inches()[1]
+    early = ending(dataset)
+    lines = [(heading(dataset), TITLE_SIZE, "bold")]
+    lines += [(line, SMALL_SIZE, "normal") for line in details]
+    if early:
+        lines += [(line, SMALL_SIZE, "bold") for line in wrap(early, 100)]
+        height += LINE * len(wrap(early, 100))
+    for number, (text, size, weight) in enumerate(lines):
+        figure.text(
+            0.015, 1 - (0.14 + LINE * number + (0.05 if number else 0)) / total, text,
+            fontsize=size, fontweight=weight, va="top", in_layout=False,
+        )  # fmt: skip
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0, 0, 1, 1 - height / total))
+
+
+def _draw_height(axes: Axes, dataset: xr.Dataset) -> None:
+    axes.plot(dataset["time"], dataset["com_y"], color=INK)
+    axes.set_ylabel("CoM height (m)")
+    _widen(axes, 0.01)
+
+
+def _draw_pitch(axes: Axes, dataset: xr.Dataset) -> None:
+    time = dataset["time"].values
+    if "pitch" in dataset:
+        axes.plot(time, np.degrees(dataset["pitch"]), color=INK, label="body")
+    else:
+        fore, hind = (np.degrees(dataset[f"{side}_pitch"].values) for side in SIDES)
+        axes.fill_between(
+            time, hind, fore, color=ENERGY_COLORS["spine"], alpha=0.22, linewidth=0,
+            label="bend of spine",
+        )  # fmt: skip
+        for side, values in zip(SIDES, (fore, hind), strict=True):
+            axes.plot(time, values, color=SIDE_COLORS[side], label=f"{side} segment")
+    axes.set_ylabel("pitch (°)\nnose up positive")
+    _widen(axes, 2.0)
+    _add_legend(axes)
+
+
+def _draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
+    for side, style in zip(SIDES, ("-", (0, (4, 1.5))), strict=True):
+        axes.plot(
+            dataset["time"], dataset[f"{side}_grf"], color=SIDE_COLORS[side], linestyle=style,
+            label=f"{side} legs",
+        )  # fmt: skip
+    axes.set_ylabel("GRF magnitude\n(N per leg pair)")
+    axes.set_ylim(bottom=0)
+    _add_legend(axes)
+
+
+def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
+    """Stack all shares, spine and legs lowest; below it these alone, each from zero."""
+    time = dataset["time"].values
+    names = ["spine", "legs", "gravity", "kinetic", "dissipated"]
+    shares = _shares(dataset)
+    shown = [name for name in names if name in shares]
+    axes.stackplot(
+        time, [shares[name] for name in shown], labels=shown, linewidth=0,
+        colors=[ENERGY_COLORS[name] for name in shown],
+    )  # fmt: skip
+    axes.set_ylim(0, 100)
+    axes.set_yticks([0, 25, 50, 75, 100])
+    axes.set_ylabel("energy (% of\ninitial total)")
+    axes.legend(*_reversed(axes), **_PLACE)
+    for name in ("legs", "spine", "dissipated"):
+        if name in shares:
+            color = ENERGY_COLORS[name]
+            style = "--" if name == "dissipated" else "-"
+            elastic.plot(time, shares[name], color=color, linestyle=style, label=name)
+            if name != "dissipated":
+                elastic.fill_between(time, shares[name], color=color, alpha=0.25, linewidth=0)
+    elastic.set_ylim(bottom=0)
+    elastic.set_ylabel("enlarged, not\nstacked (%)")
+    _add_legend(elastic)
+
+
+def _shares(dataset: xr.Dataset) -> dict[str, Array]:
+    """The energies in % of the initial total; those that the model lacks are left out."""
+    columns = {
+        "spine": "spine_energy",
+        "legs": "leg_energy",
+        "gravity": "gravity_energy",
+        "kinetic": "kinetic_energy",
+        "dissipated": "dissipated_energy",
+    }
+    energies = {name: dataset[column].values for name, column in columns.items()}
+    total = sum(float(energy[0]) for energy in energies.values())
+    return {
+        name: 100 * energy / total
+        for name, energy in energies.items()
+        if name in ("legs", "gravity", "kinetic") or np.any(energy > 1e-9 * total)
+    }
+
+
+def _draw_events(panels: list[Axes], dataset: xr.Dataset) -> None:
+    times = dataset["event_time"].values
+    apex = np.array(["apex" in kind for kind in dataset["event_kind"].values.astype(str)], bool)
+    kinds = [(times[apex], "--")] if apex.sum() <= MAX_EVENT_LINES else []
+    if len(times) <= MAX_EVENT_LINES:
+        kinds.append((times[~apex], "-"))
+    for axes in panels:
+        for some, style in kinds:
+            for time in some:
+                axes.axvline(time, color=FAINT, linestyle=style, linewidth=0.6, zorder=1.5)
+
+
+def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:
+    """Say at the foot what phase colours and vertical lines mean."""
+    seen = {span.phase for span in spans}
+    handles: list[Any] = [
+        Patch(facecolor=PHASE_COLORS[phase], label=f"{phase}: {name}")
+        for phase, name in PHASE_NAMES.items()
+        if phase in seen
+    ]
+    count = dataset.sizes["event"]
+    if 0 < count <= MAX_EVENT_LINES:
+        handles.append(Line2D([], [], color=FAINT, linewidth=0.8, label="other event"))
+    figure.legend(
+        handles=handles, loc="outside lower left", ncols=5, fontsize=SMALL_SIZE,
+        columnspacing=1.4, handlelength=1.4,
+    )  # fmt: skip
+
+
+_PLACE: dict[str, Any] = {
+    "loc": "center left",
+    "bbox_to_anchor": (1.0, 0.5),
+    "borderaxespad": 0.6,
+    "handlelength": 1.6,
+}
+
+
+def _add_legend(axes: Axes) -> None:
+    axes.legend(**_PLACE)
+
+
+def _reversed(axes: Axes) -> tuple[list[Any], list[str]]:
+    """Legend entries in the order in which the areas lie on each other."""
+    handles, labels = axes.get_legend_handles_labels()
+    return handles[::-1], labels[::-1]
+
+
+def _widen(axes: Axes, least: float) -> None:
+    """Keep rounding errors of a constant from filling the panel."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        middle = (low + high) / 2
+        axes.set_ylim(middle - least / 2, middle + least / 2)

@@ -1,0 +1,217 @@
+"""One posture as a stick figure: trunk, spine spring, spring legs, CoM and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+from matplotlib.path import Path as Outline
+
+from flexspine.report.postures import SIDES, LegPosture, Point, Posture
+from flexspine.report.style import BEND_COLORS, INK, SIDE_COLORS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+BODY_COLOR = "#5A5A5A"
+ARROW_COLOR = INK
+
+ZIGZAGS = 6
+SPRING_TURNS = 1.6
+
+# Sizes in lengths of the leg.
+ZIGZAG_WIDTH = 0.14
+TRUNK_WIDTH = 0.15
+SPRING_RADIUS = 0.115
+ARROW_LENGTH = 0.62  # of the largest force
+ARROW_WIDTH = 0.045
+
+_QUARTER = Outline.wedge(0, 90)
+QUARTERS = Outline.make_compound_path(_QUARTER, Outline.wedge(180, 270))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What all postures of a run share: leg length (m), largest force (N) and bend (rad)."""
+
+    leg: float
+    force: float
+    bend: float
+
+    @classmethod
+    def of(cls, dataset: xr.Dataset) -> Scale:
+        """Return the scale of a run, with usable values where it has no force or no bend."""
+        legs = [float(dataset[f"{side}_leg_length"].max()) for side in SIDES]
+        force = max(float(dataset[f"{side}_grf"].max()) for side in SIDES)
+        bend = float(abs(dataset["spine_angle"]).max()) if "spine_angle" in dataset else 0.0
+        return cls(max(legs), force if force > 0 else 1.0, max(bend, 1e-6))
+
+    @property
+    def arrow(self) -> float:
+        """Length of a force arrow, in m/N."""
+        return ARROW_LENGTH * self.leg / self.force
+
+
+class StickFigure:
+    """The artists of one animal; `show` moves them to a posture.
+
+    ``points_per_metre`` is how large a metre is drawn, so that lines keep their proportions.
+    """
+
+    def __init__(self, axes: Axes, scale: Scale, points_per_metre: float, jointed: bool) -> None:
+        self.axes, self.scale = axes, scale
+        self.unit = scale.leg * points_per_metre  # pt per length of the leg
+        self.jointed = jointed
+        self.arrows = {side: self._add_arrow(SIDE_COLORS[side]) for side in SIDES}
+        self.trunk = self._add_trunk()
+        self.legs = {side: self._line(3, color=SIDE_COLORS[side]) for side in SIDES}
+        self.toes = {side: self._dot(4, 0.055, SIDE_COLORS[side]) for side in SIDES}
+        self.hips = {side: self._dot(6, 0.085, "white", SIDE_COLORS[side]) for side in SIDES}
+        if jointed:
+            self.disc = self._dot(7, 2.3 * SPRING_RADIUS, "white", INK)
+            self.spring = self._line(8, width=0.032)
+        self.com = (self._dot(9, 0.1, "white", INK), self._com_quarters())
+
+    def show(self, posture: Posture, shift: float = 0.0) -> None:
+        """Move to a posture, ``shift`` m ahead of where it is."""
+        ends = [posture.legs[side].hip for side in ("hind", "fore")]
+        nodes = [ends[0], posture.joint, ends[1]] if posture.joint is not None else ends
+        for lines, (start, end) in zip(self.trunk, _pairs(nodes), strict=True):
+            for line in lines:
+                line.set_data([start[0] + shift, end[0] + shift], [start[1], end[1]])
+        for side, leg in posture.legs.items():
+            self._show_leg(side, leg, shift)
+        if posture.joint is not None and posture.bend is not None:
+            self._show_spring(posture, posture.joint, posture.bend, shift)
+        for artist in self.com:
+            artist.set_data([posture.com[0] + shift], [posture.com[1]])
+
+    def _show_leg(self, side: str, leg: LegPosture, shift: float) -> None:
+        hip = np.array(leg.hip) + (shift, 0.0)
+        toe = np.array(leg.toe) + (shift, 0.0)
+        # A leg in the air carries nothing: thin and pale.
+        line, dot = self.legs[side], self.toes[side]
+        width = ZIGZAG_WIDTH * self.scale.leg * (1.0 if leg.stands else 0.6)
+        line.set_data(*zigzag(hip, toe, width).T)
+        line.set_linewidth(self.unit * (0.034 if leg.stands else 0.018))
+        line.set_alpha(1.0 if leg.stands else 0.5)
+        dot.set_data([toe[0]], [toe[1]])
+        dot.set_alpha(1.0 if leg.stands else 0.5)
+        self.hips[side].set_data([hip[0]], [hip[1]])
+        force = self.scale.arrow * np.array(leg.force)
+        arrow = self.arrows[side]
+        arrow.set_visible(bool(np.hypot(*force) > 0.02 * self.scale.leg))
+        arrow.set_xy(arrow_outline(toe - force, toe, ARROW_WIDTH * self.scale.leg))
+
+    def _show_spring(self, posture: Posture, joint: Point, bend: float, shift: float) -> None:
+        fore, hind = (np.array(posture.legs[side].hip) - joint for side in SIDES)
+        inner = float(np.arctan2(hind[1], hind[0]))
+        outer = float(np.arctan2(fore[1], fore[0]))
+        curve = spiral(inner, outer, SPRING_RADIUS * self.scale.leg)
+        self.spring.set_data(curve[:, 0] + joint[0] + shift, curve[:, 1] + joint[1])
+        self.spring.set_color(bend_color(bend, self.scale))
+        self.disc.set_data([joint[0] + shift], [joint[1]])
+
+    def _line(self, order: float, *, color: str = INK, width: float = 0.034) -> Line2D:
+        line = Line2D(
+            [], [], color=color, linewidth=width * self.unit, zorder=order,
+            solid_capstyle="round", solid_joinstyle="round",
+        )  # fmt: skip
+        self.axes.add_line(line)
+        return line
+
+    def _dot(self, order: float, size: float, fill: str, edge: str = "none") -> Line2D:
+        return self._marker(
+            order, marker="o", markersize=size * self.unit, markerfacecolor=fill,
+            markeredgecolor=edge, markeredgewidth=0.022 * self.unit,
+        )  # fmt: skip
+
+    def _com_quarters(self) -> Line2D:
+        return self._marker(
+            10, marker=QUARTERS, markersize=0.1 * self.unit, markerfacecolor=INK,
+            markeredgecolor="none",
+        )  # fmt: skip
+
+    def _marker(self, order: float, **style: Any) -> Line2D:
+        line = Line2D([], [], linestyle="none", zorder=order, **style)
+        self.axes.add_line(line)
+        return line
+
+    def _add_trunk(self) -> list[tuple[Line2D, Line2D]]:
+        """Bars with an outline: a wide line under a narrower one."""
+        colors = [SIDE_COLORS["hind"], SIDE_COLORS["fore"]] if self.jointed else [BODY_COLOR]
+        return [
+            (
+                self._line(5, color=color, width=TRUNK_WIDTH),
+                self._line(5.1, color=_paler(color), width=TRUNK_WIDTH - 0.045),
+            )
+            for color in colors
+        ]
+
+    def _add_arrow(self, color: str) -> Polygon:
+        arrow = Polygon(np.zeros((7, 2)), facecolor=color, edgecolor="none", zorder=2, alpha=0.75)
+        self.axes.add_patch(arrow)
+        return arrow
+
+
+def zigzag(start: Array, end: Array, width: float) -> Array:
+    """A spring from ``start`` to ``end`` with straight ends, shape (points, 2)."""
+    along = end - start
+    length = float(np.hypot(*along))
+    across = np.array([-along[1], along[0]]) / length if length else np.zeros(2)
+    teeth = np.linspace(0.22, 0.82, 2 * ZIGZAGS + 1)
+    sideways = np.resize([0.0, 1.0, 0.0, -1.0], len(teeth)) * width / 2
+    body = start + np.outer(teeth, along) + np.outer(sideways, across)
+    return np.vstack([start, body, end])
+
+
+def spiral(inner: float, outer: float, radius: float) -> Array:
+    """A coil from the direction ``inner`` to ``outer`` (rad) around the origin."""
+    turn = (outer - inner) % (2 * np.pi) + 2 * np.pi * (SPRING_TURNS // 1)
+    along = np.linspace(0.0, 1.0, 80)
+    angle = inner + turn * along
+    size = radius * (0.35 + 0.6 * along)
+    return np.column_stack([size * np.cos(angle), size * np.sin(angle)])
+
+
+def arrow_outline(tail: Array, tip: Array, width: float) -> Array:
+    """An arrow as a polygon of 7 corners; its head is never longer than the arrow."""
+    along = tip - tail
+    length = float(np.hypot(*along))
+    if not length:
+        return np.tile(tip, (7, 1))
+    ahead = along / length
+    side = np.array([-ahead[1], ahead[0]]) * width / 2
+    neck = tip - ahead * min(2.2 * width, length)
+    corners = [
+        tail + side, neck + side, neck + 2.2 * side, tip,
+        neck - 2.2 * side, neck - side, tail - side,
+    ]  # fmt: skip
+    return np.array(corners)
+
+
+_BENDS = LinearSegmentedColormap.from_list("bend", BEND_COLORS)
+
+
+def bend_color(bend: float, scale: Scale) -> tuple[float, float, float, float]:
+    """Colour of a bend (rad): arched, straight, sagging."""
+    return _BENDS(0.5 + 0.5 * bend / scale.bend)
+
+
+def _pairs(nodes: list[Point]) -> Iterable[tuple[Point, Point]]:
+    return zip(nodes[:-1], nodes[1:], strict=True)
+
+
+def _paler(color: str) -> tuple[float, ...]:
+    from matplotlib.colors import to_rgb
+
+    return tuple(1 - 0.45 * (1 - part) for part in to_rgb(color))

@@ -1,0 +1,83 @@
+"""How the pictures look: colours that colour-blind readers can tell apart, and type sizes.
+
+Colours are those of Okabe & Ito (2008), "Color Universal Design". Fore and hind keep theirs in
+every picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+BLUE = "#0072B2"
+VERMILION = "#D55E00"
+PURPLE = "#CC79A7"
+
+INK = "#1A1A1A"
+FAINT = "#9A9A9A"
+
+SIDE_COLORS = {"fore": BLUE, "hind": VERMILION}
+
+# Tints of the leg that stands, so that a phase is told by the colour of its legs.
+PHASE_COLORS = {"DF": "#E3E3E3", "FS": "#94C3E3", "HS": "#F3B48A", "DS": "#DDA9C6"}
+
+ENERGY_COLORS = {
+    "spine": GREEN,
+    "legs": ORANGE,
+    "gravity": "#B5B5B5",
+    "kinetic": SKY,
+    "dissipated": "#4D4D4D",
+}
+
+# Arched, straight, sagging: told apart by lightness at the ends and hue in between.
+BEND_COLORS = (GREEN, "#F2F2F2", "#A6407C")
+
+TEXT_SIZE = 9.0  # pt
+SMALL_SIZE = 8.0  # pt
+TITLE_SIZE = 11.0  # pt
+
+_SETTINGS: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": TEXT_SIZE,
+    "axes.labelsize": TEXT_SIZE,
+    "axes.titlesize": TEXT_SIZE,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "figure.facecolor": "white",
+    "figure.dpi": 100,
+    "legend.fontsize": SMALL_SIZE,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "savefig.bbox": None,
+    "savefig.dpi": "figure",
+    "savefig.facecolor": "auto",
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+    "text.color": INK,
+    "text.usetex": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": SMALL_SIZE,
+    "ytick.labelsize": SMALL_SIZE,
+}
+
+
+@contextmanager
+def themed() -> Iterator[None]:
+    """Draw with these settings inside the ``with`` block, whatever the user's are outside."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_SETTINGS)
+        yield

@@ -1,0 +1,110 @@
+"""When things happen in a run: its phases, apexes and cycles, and the bar that shows the phases."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from flexspine.errors import InputError
+from flexspine.report.style import INK, PHASE_COLORS, SMALL_SIZE
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+PHASE_NAMES = {
+    "DF": "both legs in flight",
+    "FS": "fore stance",
+    "HS": "hind stance",
+    "DS": "both legs in stance",
+}
+
+APEX_TOLERANCE = 1e-9  # m/s; a run started at an apex has exactly zero vertical speed
+
+
+class Span(NamedTuple):
+    """A stretch of time (s) in one phase; ``first`` and ``last`` are its samples."""
+
+    start: float
+    end: float
+    phase: str
+    first: int
+    last: int
+
+
+def check_samples(dataset: xr.Dataset) -> None:
+    """Raise `InputError` for a dataset from which nothing can be drawn."""
+    if dataset.sizes.get("time", 0) == 0:
+        message = dataset.attrs.get("message")
+        raise InputError(
+            f"the run has no samples{f' ({message})' if message else ''}",
+            "start it from a state that lasts for some time",
+        )
+    for name in ("com_x", "com_y", "phase", "event_time"):
+        if name not in dataset:
+            raise InputError(f"the dataset has no '{name}'", "give one made by to_dataset")
+
+
+def phase_spans(dataset: xr.Dataset) -> list[Span]:
+    """Return the phases in order; they meet at the times of the events between the samples."""
+    time = dataset["time"].values
+    phase = dataset["phase"].values.astype(str)
+    events = np.sort(dataset["event_time"].values)
+    firsts = [0, *(np.flatnonzero(phase[1:] != phase[:-1]) + 1)]
+    starts = [float(time[0])]
+    for first in firsts[1:]:
+        # A sample at the very instant of an event belongs to what follows.
+        between = events[(events > time[first - 1]) & (events <= time[first])]
+        starts.append(float(between[0] if len(between) else time[first]))
+    return [
+        Span(start, end, str(phase[first]), int(first), int(following) - 1)
+        for start, end, first, following in zip(
+            starts, [*starts[1:], float(time[-1])], firsts, [*firsts[1:], len(time)], strict=True
+        )
+    ]
+
+
+def apex_times(dataset: xr.Dataset) -> NDArray[np.float64]:
+    """Return the times (s) of the apexes, the start included if the run began at one."""
+    time = dataset["time"].values
+    kinds = dataset["event_kind"].values.astype(str)
+    apex = np.array(["apex" in kind for kind in kinds], dtype=bool)
+    times = dataset["event_time"].values[apex]
+    climbing = float(dataset["com_y_rate"].values[0])
+    if str(dataset["phase"].values[0]) == "DF" and abs(climbing) < APEX_TOLERANCE:
+        times = np.append(time[0], times)
+    return np.unique(times[(times >= time[0]) & (times <= time[-1])])
+
+
+def last_cycle(dataset: xr.Dataset) -> tuple[float, float]:
+    """Return start and end (s) of the last apex-to-apex interval, else those of the run."""
+    apexes = apex_times(dataset)
+    if len(apexes) > 1:
+        return float(apexes[-2]), float(apexes[-1])
+    return float(dataset["time"].values[0]), float(dataset["time"].values[-1])
+
+
+def draw_phase_bar(axes: Axes, spans: list[Span], window: tuple[float, float]) -> None:
+    """Fill the axes with a bar of the phases over ``window`` (s), labelled where there is room."""
+    for phase, color in PHASE_COLORS.items():
+        pieces = [(s.start, s.end - s.start) for s in spans if s.phase == phase]
+        axes.broken_barh(pieces, (0, 1), facecolors=color, edgecolors="white", linewidth=0.4)
+    axes.set_xlim(*window)
+    axes.set_ylim(0, 1)
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)
+
+
+def label_phases(axes: Axes, spans: list[Span], width: float) -> None:
+    """Write the names into a bar that is ``width`` inches wide, where they fit."""
+    left, right = axes.get_xlim()
+    room = 2.6 * SMALL_SIZE / 72  # in; two letters and some air
+    for span in spans:
+        start, end = max(span.start, left), min(span.end, right)
+        if (end - start) / (right - left) * width > room:
+            axes.text(
+                (start + end) / 2, 0.48, span.phase,
+                ha="center", va="center", fontsize=SMALL_SIZE, color=INK,
+            )  # fmt: skip

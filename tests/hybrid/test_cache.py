@@ -1,0 +1,99 @@
+"""Compiled code on disk: whatever happens to it, runs go on and say nothing."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+from flexspine import load_model, simulate
+print(simulate(load_model("slip")).apexes[-1]["height"])
+"""
+
+
+def run_with(cache: Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env={**os.environ, "FLEXSPINE_CACHE_DIR": str(cache)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    assert done.stderr == ""
+    return done.stdout
+
+
+def entries(cache: Path) -> int:
+    """How many pieces of code heyoka's store holds."""
+    with closing(sqlite3.connect(cache / "cache.db")) as store:
+        return int(store.execute("select count(*) from cache").fetchone()[0])
+
+
+def files(cache: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_size for path in cache.iterdir()}
+
+
+def test_a_second_start_finds_what_the_first_compiled(tmp_path: Path) -> None:
+    first = run_with(tmp_path)
+    compiled = entries(tmp_path)
+    assert compiled > 5
+    assert run_with(tmp_path) == first
+    assert entries(tmp_path) == compiled
+
+
+@pytest.mark.parametrize("damage", ["garbage", "truncated", "flipped"])
+def test_a_corrupt_cache_is_rebuilt_silently(tmp_path: Path, damage: str) -> None:
+    expected = run_with(tmp_path)
+    (store,) = (path for path in tmp_path.iterdir() if path.stat().st_size > 100_000)
+    content = bytearray(store.read_bytes())
+    if damage == "garbage":
+        content = bytearray(os.urandom(len(content)))
+    elif damage == "truncated":
+        del content[9000:]
+    else:
+        for i in range(8000, len(content), 997):
+            content[i] ^= 0xFF
+    store.write_bytes(content)
+    assert run_with(tmp_path) == expected
+    run_with(tmp_path)
+    assert run_with(tmp_path) == expected
+    assert sum(files(tmp_path).values()) > 100_000, "rebuilt, not merely bypassed"
+
+
+def test_a_cache_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a directory")
+    run_with(blocked / "cache")
+    run_with(blocked)
+    assert blocked.read_text() == "not a directory"
+
+
+def test_a_read_only_cache_is_done_without(tmp_path: Path) -> None:
+    if os.geteuid() == 0:
+        pytest.skip("permissions do not bind the superuser")
+    tmp_path.chmod(0o500)
+    try:
+        run_with(tmp_path)
+    finally:
+        tmp_path.chmod(0o700)
+
+
+def test_processes_that_share_a_new_cache_agree(tmp_path: Path) -> None:
+    env = {**os.environ, "FLEXSPINE_CACHE_DIR": str(tmp_path)}
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", PROGRAM], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        for _ in range(4)
+    ]
+    answers = [process.communicate(timeout=240) for process in started]
+    assert [process.returncode for process in started] == [0] * 4
+    assert len({out for out, _ in answers}) == 1
+    assert {err for _, err in answers} == {b""}
