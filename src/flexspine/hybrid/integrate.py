@@ -125,6 +125,11 @@ class _Run:
             result = self.advance(integrator, limit)
             if self.outcome is not None:
                 return
+            if result == hy.taylor_outcome.err_nf_state:
+                self.outcome = Outcome(
+                    DIVERGED, f"not finite after t = {self.time:.6g} s in {self.mode}"
+                )
+                return
             self.time, self.states = integrator.time, code.state.copy()
             index = -int(result) - 1
             if not 0 <= index < len(jumps):
@@ -165,11 +170,12 @@ class _Run:
         """Keep an arc; if a guard touches zero within it without crossing, end the run there."""
         touch = touches_without_crossing(arc, self.bound.mode(arc.mode))
         if touch is not None:
-            name, self.time = touch
-            arc = arc.until(self.time)
-            self.states = arc(np.array([self.time]))[0]
-            self.outcome = Outcome(GRAZED, f"{name} missed by a hair at t = {self.time:.9g} s")
+            name, time = touch
+            arc = arc.until(time)
+            self.outcome = Outcome(GRAZED, f"{name} missed by a hair at t = {time:.9g} s")
         self.arcs.append(arc)
+        self.time = arc.end
+        self.states = arc(arc.times[-1:])[0]
 
     def _stopped(self, result: Any, limit: float) -> Outcome:
         if result == hy.taylor_outcome.time_limit:
@@ -180,11 +186,9 @@ class _Run:
                 f"no {self.section.guard} within {self.section_timeout:g} s after "
                 f"{len(self.crossings)} of {self.wanted}, still in {self.mode}",
             )
-        if result == hy.taylor_outcome.step_limit:
-            return Outcome(
-                TIMED_OUT, f"{self.max_steps} steps in {self.mode} reached only t = {self.time:g} s"
-            )
-        return Outcome(DIVERGED, f"not finite after t = {self.time:.6g} s in {self.mode}")
+        return Outcome(
+            TIMED_OUT, f"{self.max_steps} steps in {self.mode} reached only t = {self.time:g} s"
+        )
 
     def _happens(self, jump: Jump, mode: BoundMode) -> bool:
         """Let one guard fire; returns whether the flow has to start anew."""

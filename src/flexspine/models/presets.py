@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from flexspine.errors import PresetError, UnknownNameError
+from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.model import Model, Source
 from flexspine.models.registry import find_kind
 from flexspine.parameters import build, flattened
@@ -40,28 +40,32 @@ def load_model(
     ``touchdown`` by leg; SI and radians. Raises `UnknownNameError`, `PresetError`,
     `ParameterError`.
     """
-    name, text = _find(str(preset))
-    content = _parse(name, text)
-    try:
-        model = _model(name, content)
-    except PresetError:
-        raise
-    except UnknownNameError as failure:
-        if str(preset) in preset_names():
-            raise
-        raise PresetError(f"{preset}: {failure.message}", failure.remedy) from None
+    model = _load(str(preset), ())
     return model.with_values(parameters, apex=apex, touchdown=touchdown)
 
 
-def _find(preset: str) -> tuple[str, str]:
+def _load(name: str, users: tuple[str, ...]) -> Model:
+    """Load a preset or a file; ``users`` are the files that are based on it."""
+    if name in users:
+        raise PresetError(f"'{name}' is its own base", "base it on a preset")
+    content = _parse(name, _read(name))
+    try:
+        return _model(name, content, users)
+    except InputError as failure:
+        if isinstance(failure, PresetError):
+            raise
+        raise PresetError(f"'{name}': {failure.message}", failure.remedy) from None
+
+
+def _read(preset: str) -> str:
     if preset in preset_names():
         resource = files("flexspine") / "presets" / f"{preset}.toml"
-        return preset, resource.read_text(encoding="utf-8")
+        return resource.read_text(encoding="utf-8")
     path = Path(preset)
     if path.suffix != ".toml" and not path.exists():
         raise UnknownNameError("preset", preset, preset_names())
     try:
-        return preset, path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except OSError as failure:
         raise PresetError(
             f"cannot read '{preset}' ({failure.strerror})", "give a readable TOML file"
@@ -88,10 +92,10 @@ def _parse(name: str, text: str) -> dict[str, Any]:
     return content
 
 
-def _model(name: str, content: Mapping[str, Any]) -> Model:
+def _model(name: str, content: Mapping[str, Any], users: tuple[str, ...]) -> Model:
     title = Path(name).stem if name.endswith(".toml") else name
     if "base" in content:
-        return _based(title, name, content)
+        return _based(title, name, content, users)
     if "model" not in content:
         raise PresetError(f"'{name}' names no model", 'add model = "..." or base = "PRESET"')
     kind = find_kind(content["model"])
@@ -112,11 +116,11 @@ def _model(name: str, content: Mapping[str, Any]) -> Model:
     )
 
 
-def _based(title: str, name: str, content: Mapping[str, Any]) -> Model:
+def _based(title: str, name: str, content: Mapping[str, Any], users: tuple[str, ...]) -> Model:
     """A file that changes some values of a preset."""
     if "model" in content:
         raise PresetError(f"'{name}' has both 'model' and 'base'", "keep one of them")
-    base = load_model(content["base"])
+    base = _load(content["base"], (*users, name))
     changed = flattened(content.get("parameters", {}))
     model = base.with_values(
         changed, apex=_numbers(content, "apex"), touchdown=_numbers(content, "touchdown")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import zip_longest
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from flexspine.report.style import (
     ENERGY_COLORS,
@@ -28,6 +30,7 @@ from flexspine.report.timeline import (
     draw_phase_bar,
     label_phases,
     phase_spans,
+    window,
 )
 
 if TYPE_CHECKING:
@@ -42,6 +45,8 @@ SIDES = ("fore", "hind")
 # More lines than this would hide the curves: only apexes are drawn, then none.
 MAX_EVENT_LINES = 80
 
+MANY_PHASES = 120  # from here on thick lines would run together
+
 LINE = 0.175  # in; from one line of the title to the next
 
 
@@ -51,9 +56,9 @@ def plot_run(dataset: xr.Dataset) -> Figure:
     Raises `InputError` for a dataset without samples.
     """
     check_samples(dataset)
-    with themed():
+    spans = phase_spans(dataset)
+    with themed({"lines.linewidth": 1.5 if len(spans) <= MANY_PHASES else 0.7}):
         time = dataset["time"].values
-        spans = phase_spans(dataset)
         details = describe(dataset)
         title = 0.38 + LINE * len(details)
         width = float(np.clip(7.4 + 0.1 * (len(spans) - 20), 7.4, 12.0))
@@ -61,7 +66,7 @@ def plot_run(dataset: xr.Dataset) -> Figure:
         bar, *panels = figure.subplots(
             6, 1, sharex=True, height_ratios=[0.24, 1, 1, 1.2, 1.15, 0.95]
         )
-        draw_phase_bar(bar, spans, (float(time[0]), float(time[-1])))
+        draw_phase_bar(bar, spans, window(time))
         bar.tick_params(bottom=False)
         height, pitch, forces, energy, elastic = panels
         _draw_height(height, dataset)
@@ -79,16 +84,16 @@ def plot_run(dataset: xr.Dataset) -> Figure:
 
 
 def describe(dataset: xr.Dataset) -> list[str]:
-    """Return what a reader must know about a run, in lines: parameters, energy, outcome."""
+    """Return what a reader must know about a run, in lines: parameters, energy, speed."""
     given: dict[str, Any] = json.loads(dataset.attrs.get("parameters", "{}"))
     parts = []
     if "spine.stiffness" in given:
         parts.append(f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad")
         if given.get("spine.damping"):
             parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
-    parts += _of_legs(given, "stiffness", "N/m per leg pair")
+    parts += _of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     if any(given.get(f"{side}.leg.damping") for side in SIDES):
-        parts += _of_legs(given, "damping", "N s/m per leg pair")
+        parts += _of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
     angles = json.loads(dataset.attrs.get("touchdown_angles", "{}"))
     if angles:
         both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
@@ -97,15 +102,17 @@ def describe(dataset: xr.Dataset) -> list[str]:
     duration = float(dataset["time"][-1] - dataset["time"][0])
     if duration > 0:
         moved = float(dataset["com_x"][-1] - dataset["com_x"][0])
-        parts.append(f"mean speed {moved / duration:.3g} m/s")
-    return _joined(parts)
+        parts.append(f"mean speed {moved / duration:#.3g} m/s")
+    origins = json.loads(dataset.attrs.get("provenance", "{}"))
+    changed = [name for name, origin in origins.items() if origin == "set by user"]
+    return _joined(parts) + ([f"changed from the preset: {_few(changed)}"] if changed else [])
 
 
-def _of_legs(given: dict[str, Any], what: str, unit: str) -> list[str]:
-    fore, hind = (given.get(f"{side}.leg.{what}") for side in SIDES)
+def _of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str]:
+    fore, hind = (given.get(f"{side}.leg.{name}") for side in SIDES)
     if fore is None or hind is None:
         return []
-    value = f"= {fore:g}" if fore == hind else f"fore {fore:g}, hind {hind:g}"
+    value = f"= {fore:g}" if fore == hind else f"= {fore:g} (fore), {hind:g} (hind)"
     return [f"leg {what} {value} {unit}"]
 
 
@@ -120,15 +127,15 @@ def _joined(parts: list[str], limit: int = 100) -> list[str]:
     return lines
 
 
+def _few(names: list[str], most: int = 4) -> str:
+    more = [f"{len(names) - most} more"] if len(names) > most else []
+    return ", ".join(names[:most] + more)
+
+
 def heading(dataset: xr.Dataset) -> str:
-    """Return the name of what ran; a preset whose values were changed says so."""
+    """Return the name of what ran."""
     attrs = dataset.attrs
-    name = f"{attrs.get('preset', 'run')}: {attrs.get('model', 'bounder').replace('-', ' ')}"
-    origins = json.loads(attrs.get("provenance", "{}"))
-    changed = [what for what, origin in origins.items() if origin == "set by user"]
-    if not changed:
-        return name
-    return f"{name}, with own " + (", ".join(changed) if len(changed) < 4 else "values")
+    return f"{attrs.get('preset', 'run')}: {attrs.get('model', 'bounder').replace('-', ' ')}"
 
 
 def ending(dataset: xr.Dataset) -> str | None:
@@ -160,6 +167,7 @@ def _add_title(figure: Figure, dataset: xr.Dataset, details: list[str], height: 
 def _draw_height(axes: Axes, dataset: xr.Dataset) -> None:
     axes.plot(dataset["time"], dataset["com_y"], color=INK)
     axes.set_ylabel("CoM height (m)")
+    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     _widen(axes, 0.01)
 
 
@@ -169,25 +177,30 @@ def _draw_pitch(axes: Axes, dataset: xr.Dataset) -> None:
         axes.plot(time, np.degrees(dataset["pitch"]), color=INK, label="body")
     else:
         fore, hind = (np.degrees(dataset[f"{side}_pitch"].values) for side in SIDES)
+        for side, values in zip(SIDES, (fore, hind), strict=True):
+            axes.plot(time, values, color=SIDE_COLORS[side], label=f"{side} segment")
         axes.fill_between(
             time, hind, fore, color=ENERGY_COLORS["spine"], alpha=0.22, linewidth=0,
             label="bend of spine",
         )  # fmt: skip
-        for side, values in zip(SIDES, (fore, hind), strict=True):
-            axes.plot(time, values, color=SIDE_COLORS[side], label=f"{side} segment")
     axes.set_ylabel("pitch (°)\nnose up positive")
+    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     _widen(axes, 2.0)
     _add_legend(axes)
 
 
 def _draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
+    # Dashes let the fore legs show where both carry the same.
     for side, style in zip(SIDES, ("-", (0, (4, 1.5))), strict=True):
+        force = dataset[f"{side}_grf"].values
+        loaded = np.convolve(force > 0, np.ones(3))[1:-1] > 0
         axes.plot(
-            dataset["time"], dataset[f"{side}_grf"], color=SIDE_COLORS[side], linestyle=style,
-            label=f"{side} legs",
+            dataset["time"], np.where(loaded, force, np.nan), color=SIDE_COLORS[side],
+            linestyle=style, label=f"{side} legs",
         )  # fmt: skip
     axes.set_ylabel("GRF magnitude\n(N per leg pair)")
-    axes.set_ylim(bottom=0)
+    top = max(float(dataset[f"{side}_grf"].max()) for side in SIDES)
+    axes.set_ylim(0, 1.06 * top or 1.0)
     _add_legend(axes)
 
 
@@ -235,32 +248,44 @@ def _shares(dataset: xr.Dataset) -> dict[str, Array]:
     }
 
 
-def _draw_events(panels: list[Axes], dataset: xr.Dataset) -> None:
+def _event_lines(dataset: xr.Dataset) -> list[tuple[str, str, Array]]:
+    """Line style, name and times (s) of the events, without those too many to be told apart."""
     times = dataset["event_time"].values
-    apex = np.array(["apex" in kind for kind in dataset["event_kind"].values.astype(str)], bool)
-    kinds = [(times[apex], "--")] if apex.sum() <= MAX_EVENT_LINES else []
+    kinds = dataset["event_kind"].values.astype(str)
+    apex = np.array(["apex" in kind for kind in kinds], dtype=bool)
+    contact = np.array(["touchdown" in k or "lift-off" in k for k in kinds], dtype=bool) & ~apex
+    rest = ~apex & ~contact
+    lines = [("--", "apex", times[apex]), (":", ", ".join(sorted(set(kinds[rest]))), times[rest])]
     if len(times) <= MAX_EVENT_LINES:
-        kinds.append((times[~apex], "-"))
+        lines.insert(0, ("-", "touchdown, lift-off", times[contact]))
+    return [line for line in lines if 0 < len(line[2]) <= MAX_EVENT_LINES]
+
+
+def _draw_events(panels: list[Axes], dataset: xr.Dataset) -> None:
     for axes in panels:
-        for some, style in kinds:
-            for time in some:
+        for style, _, times in _event_lines(dataset):
+            for time in times:
                 axes.axvline(time, color=FAINT, linestyle=style, linewidth=0.6, zorder=1.5)
 
 
 def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:
-    """Say at the foot what phase colours and vertical lines mean."""
+    """Say at the foot what phase colours mean, and below it the vertical lines."""
     seen = {span.phase for span in spans}
-    handles: list[Any] = [
+    phases = [
         Patch(facecolor=PHASE_COLORS[phase], label=f"{phase}: {name}")
         for phase, name in PHASE_NAMES.items()
         if phase in seen
     ]
-    count = dataset.sizes["event"]
-    if 0 < count <= MAX_EVENT_LINES:
-        handles.append(Line2D([], [], color=FAINT, linewidth=0.8, label="other event"))
+    lines = [
+        Line2D([], [], color=INK, linestyle=style, linewidth=0.7, label=name)
+        for style, name, _ in _event_lines(dataset)
+    ]
+    # A legend fills its columns first.
+    blank = Line2D([], [], linestyle="none", label=" ")
+    pairs = list(zip_longest(phases, lines, fillvalue=blank))
     figure.legend(
-        handles=handles, loc="outside lower left", ncols=5, fontsize=SMALL_SIZE,
-        columnspacing=1.4, handlelength=1.4,
+        handles=[handle for pair in pairs for handle in pair], loc="outside lower left",
+        ncols=len(pairs), fontsize=SMALL_SIZE, columnspacing=1.6, handlelength=1.5,
     )  # fmt: skip
 
 

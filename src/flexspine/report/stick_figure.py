@@ -62,21 +62,23 @@ class Scale:
 
 
 class StickFigure:
-    """The artists of one animal; `show` moves them to a posture.
+    """The artists of an animal like ``example``; `show` moves them to a posture.
 
     ``points_per_metre`` is how large a metre is drawn, so that lines keep their proportions.
     """
 
-    def __init__(self, axes: Axes, scale: Scale, points_per_metre: float, jointed: bool) -> None:
+    def __init__(
+        self, axes: Axes, scale: Scale, points_per_metre: float, example: Posture
+    ) -> None:
         self.axes, self.scale = axes, scale
         self.unit = scale.leg * points_per_metre  # pt per length of the leg
-        self.jointed = jointed
+        self.jointed = example.joint is not None
         self.arrows = {side: self._add_arrow(SIDE_COLORS[side]) for side in SIDES}
         self.trunk = self._add_trunk()
         self.legs = {side: self._line(3, color=SIDE_COLORS[side]) for side in SIDES}
         self.toes = {side: self._dot(4, 0.055, SIDE_COLORS[side]) for side in SIDES}
         self.hips = {side: self._dot(6, 0.085, "white", SIDE_COLORS[side]) for side in SIDES}
-        if jointed:
+        if self.jointed:
             self.disc = self._dot(7, 2.3 * SPRING_RADIUS, "white", INK)
             self.spring = self._line(8, width=0.032)
         self.com = (self._dot(9, 0.1, "white", INK), self._com_quarters())

@@ -73,11 +73,11 @@ _SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def themed() -> Iterator[None]:
+def themed(changes: dict[str, Any] | None = None) -> Iterator[None]:
     """Draw with these settings inside the ``with`` block, whatever the user's are outside."""
     import matplotlib as mpl
 
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(_SETTINGS)
+        mpl.rcParams.update({**_SETTINGS, **(changes or {})})
         yield

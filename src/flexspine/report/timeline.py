@@ -86,12 +86,17 @@ def last_cycle(dataset: xr.Dataset) -> tuple[float, float]:
     return float(dataset["time"].values[0]), float(dataset["time"].values[-1])
 
 
-def draw_phase_bar(axes: Axes, spans: list[Span], window: tuple[float, float]) -> None:
-    """Fill the axes with a bar of the phases over ``window`` (s), labelled where there is room."""
+def window(time: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the limits (s) of a time axis, apart even for a single sample."""
+    return float(time[0]), max(float(time[-1]), float(time[0]) + 1e-6)
+
+
+def draw_phase_bar(axes: Axes, spans: list[Span], limits: tuple[float, float]) -> None:
+    """Fill the axes with a bar of the phases over ``limits`` (s)."""
     for phase, color in PHASE_COLORS.items():
         pieces = [(s.start, s.end - s.start) for s in spans if s.phase == phase]
         axes.broken_barh(pieces, (0, 1), facecolors=color, edgecolors="white", linewidth=0.4)
-    axes.set_xlim(*window)
+    axes.set_xlim(*limits)
     axes.set_ylim(0, 1)
     axes.set_yticks([])
     axes.spines[:].set_visible(False)
@@ -100,7 +105,7 @@ def draw_phase_bar(axes: Axes, spans: list[Span], window: tuple[float, float]) -
 def label_phases(axes: Axes, spans: list[Span], width: float) -> None:
     """Write the names into a bar that is ``width`` inches wide, where they fit."""
     left, right = axes.get_xlim()
-    room = 2.6 * SMALL_SIZE / 72  # in; two letters and some air
+    room = 2.2 * SMALL_SIZE / 72  # in; two letters and some air
     for span in spans:
         start, end = max(span.start, left), min(span.end, right)
         if (end - start) / (right - left) * width > room:

@@ -1,0 +1,178 @@
+"""A run in motion: an animation, or a strip of postures over one cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from pathlib import Path
+from subprocess import CalledProcessError
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.figure import Figure
+
+from flexspine.errors import MachineError, InputError, OutputError, ParameterError
+from flexspine.report.figure import ending, heading
+from flexspine.report.postures import Posture, postures
+from flexspine.report.scene import DOTS, Scene, View, add_force_key, draw_ground, pill
+from flexspine.report.stick_figure import Scale, StickFigure
+from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
+from flexspine.report.timeline import check_samples, last_cycle
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+# Twenty-four seconds at the usual rate: enough of any run.
+MAX_FRAMES = 600
+MAX_RATE = 100  # frames per second; a GIF counts time in hundredths of a second
+
+MAX_POSTURES = 40
+CELL = 1.42  # in, the width of one posture
+
+
+def animate(
+    dataset: xr.Dataset,
+    path: Path,
+    *,
+    fps: int = 25,
+    slow_down: float = 8.0,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Write a run as an animated stick figure, ``slow_down`` times slower than real.
+
+    The suffix of ``path``, .gif or .mp4, gives the format. Of a run that needs more than 600
+    frames the last 600 are shown. ``progress`` is told the share that is done, 0 to 1. Raises
+    `InputError`, among them `OutputError` for a path that cannot be written to, and
+    `MachineError` where the video encoder fails.
+    """
+    check_samples(dataset)
+    path = Path(path)
+    times = frame_times(dataset, fps, slow_down)
+    writer = _writer(path, fps)
+    # Frames go to a file beside it, so that a failure leaves no half-written picture.
+    part = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
+    try:
+        part.touch()
+        with themed(_encoder()):
+            scene = Scene(dataset, times, slow_down)
+            with writer.saving(scene.figure, part, dpi=DOTS):
+                for number, posture in enumerate(scene.postures, start=1):
+                    scene.show(posture)
+                    writer.grab_frame()
+                    if progress is not None:
+                        progress(number / len(times))
+        part.replace(path)
+    except CalledProcessError as error:
+        raise MachineError(
+            f"the video encoder failed with status {error.returncode}", "write a .gif instead"
+        ) from error
+    except OSError as error:
+        raise OutputError(
+            f"cannot write '{path}' ({error.strerror})", "give a place that can be written to"
+        ) from error
+    finally:
+        if part.parent.is_dir():
+            part.unlink(missing_ok=True)
+
+
+def frame_times(dataset: xr.Dataset, fps: int, slow_down: float) -> Array:
+    """Return the times (s) of the frames, evenly spaced; the last `MAX_FRAMES` at most.
+
+    Raises `ParameterError` for a rate that cannot be used.
+    """
+    if not 1 <= fps <= MAX_RATE:
+        raise ParameterError(f"fps = {fps} is not usable", f"give 1 to {MAX_RATE} per second")
+    if not (isfinite(slow_down) and slow_down > 0):
+        raise ParameterError(f"slow_down = {slow_down} is not usable", "give a number above zero")
+    start, end = float(dataset["time"].values[0]), float(dataset["time"].values[-1])
+    step = 1 / (fps * slow_down)
+    # One more than fits: the last frame is the end of the run.
+    count = int(min(np.ceil((end - start) / step), MAX_FRAMES - 1)) + 1
+    return np.clip(end - step * np.arange(count)[::-1], start, end)
+
+
+def _writer(path: Path, fps: int) -> AbstractMovieWriter:
+    suffix = path.suffix.lower()
+    if suffix == ".gif":
+        return PillowWriter(fps=fps)
+    if suffix == ".mp4":
+        return FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20"])
+    raise InputError(
+        f"cannot write an animation as '{path.name}'", "give a name that ends in .gif or .mp4"
+    )
+
+
+def _encoder() -> dict[str, Any]:
+    import imageio_ffmpeg
+
+    return {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
+
+
+def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
+    """Draw ``frames`` evenly spaced postures over the last apex-to-apex cycle, else the run.
+
+    The postures stand side by side; the way between them is not drawn. Raises `InputError`.
+    """
+    check_samples(dataset)
+    if not 1 <= frames <= MAX_POSTURES:
+        raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
+    start, end = last_cycle(dataset)
+    shown = postures(dataset, np.linspace(start, end, frames))
+    scale = Scale.of(dataset)
+    view = View.of(shown, scale)
+    left, right, foot, head = 0.62, 0.1, 0.86, 0.52  # in, around the postures
+    width = max(CELL * frames, 5.5 - left - right)
+    height = (view.high - view.low) * CELL / (2 * view.aside)
+    size = left + width + right, foot + height + head
+    with themed():
+        figure = Figure(figsize=size)
+        axes = figure.add_axes(
+            (left / size[0], foot / size[1], width / size[0], height / size[1])
+        )
+        axes.set_xlim(-view.aside, -view.aside + 2 * view.aside * width / CELL)
+        draw_ground(axes, axes.get_xlim(), view, scale)
+        axes.set_ylabel("height (m)")
+        axes.spines["bottom"].set_visible(False)
+        axes.set_xticks([])
+        for number, posture in enumerate(shown):
+            middle = 2 * view.aside * number
+            animal = StickFigure(axes, scale, 72 * CELL / (2 * view.aside), posture)
+            animal.show(posture, middle - posture.com[0])
+            _label(axes, middle, posture)
+        add_force_key(figure, axes, scale, (left + 0.05, 0.2))
+        _write_heading(figure, dataset, shown)
+    return figure
+
+
+def _label(axes: Axes, middle: float, posture: Posture) -> None:
+    """Write phase and time under a posture."""
+    below = axes.get_xaxis_transform()
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": SMALL_SIZE}
+    offset = {"textcoords": "offset points", "xycoords": below, "annotation_clip": False}
+    axes.annotate(
+        posture.phase, (middle, 0), (0, -9), bbox=pill(posture.phase), fontweight="bold",
+        **offset, **style,
+    )  # fmt: skip
+    axes.annotate(f"{posture.time:.3f} s", (middle, 0), (0, -26), **offset, **style)
+
+
+def _write_heading(figure: Figure, dataset: xr.Dataset, shown: list[Posture]) -> None:
+    width, height = figure.get_size_inches()
+    early = ending(dataset)
+    title = heading(dataset) + (f" ({early})" if early else "")
+    figure.text(
+        0.12 / width, 1 - 0.2 / height, title,
+        fontsize=TITLE_SIZE, fontweight="bold", va="center",
+    )  # fmt: skip
+    first, last = shown[0], shown[-1]
+    figure.text(
+        1 - 0.12 / width, 0.2 / height,
+        f"side by side; it travels {last.com[0] - first.com[0]:.3g} m"
+        f" in {last.time - first.time:.3g} s",
+        ha="right", va="center", fontsize=SMALL_SIZE,
+    )  # fmt: skip
