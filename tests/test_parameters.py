@@ -44,7 +44,9 @@ def test_an_unknown_name_is_refused_with_a_suggestion() -> None:
     )
 
 
-@pytest.mark.parametrize("value", [-1.0, 0.0, math.nan, math.inf, -math.inf, 1e300, "3", None, True])
+@pytest.mark.parametrize(
+    "value", [-1.0, 0.0, math.nan, math.inf, -math.inf, 1e300, "3", None, True]
+)
 def test_a_mass_that_is_no_mass_is_refused_by_name(value: object) -> None:
     with pytest.raises(ParameterError, match=r"parameter 'fore\.mass' = .* kg"):
         replaced(PUBLISHED, {"fore.mass": value})

@@ -32,9 +32,7 @@ def test_the_double_pendulum_is_the_textbook_one() -> None:
         -3 * g * sp.sin(a) - g * sp.sin(a - 2 * b)
         - 2 * sp.sin(d) * (vb**2 + va**2 * sp.cos(d))
     ) / below  # fmt: skip
-    textbook_two = (
-        2 * sp.sin(d) * (2 * va**2 + 2 * g * sp.cos(a) + vb**2 * sp.cos(d)) / below
-    )
+    textbook_two = 2 * sp.sin(d) * (2 * va**2 + 2 * g * sp.cos(a) + vb**2 * sp.cos(d)) / below
     values = {a: 0.3, b: -1.1, va: 0.7, vb: -0.4, g: 9.81}
     assert abs((one - textbook_one).subs(values)) < 1e-12
     assert abs((two - textbook_two).subs(values)) < 1e-12

@@ -26,9 +26,7 @@ def test_a_stride_runs_backwards_along_itself(preset: Model) -> None:
     forward = simulate(preset)
     end = forward.apexes[-1]
     rates = {name: -value for name, value in end.items() if name == "speed" or "rate" in name}
-    backward = simulate(
-        preset.with_values(apex={**end, **rates}, touchdown=liftoff_angles(preset))
-    )
+    backward = simulate(preset.with_values(apex={**end, **rates}, touchdown=liftoff_angles(preset)))
     assert backward.phases == forward.phases[::-1]
     period = forward.trajectory.duration
     assert backward.trajectory.duration == pytest.approx(period, abs=1e-11)
@@ -125,8 +123,6 @@ def test_recording_does_not_change_a_run(preset: Model) -> None:
 
     recorded = simulate(preset, strides=2)
     plain = integrate(preset.bind(recorded.tolerance), preset.apex_state(), crossings=2)
-    np.testing.assert_allclose(
-        plain.end.states, recorded.trajectory.end.states, rtol=0, atol=1e-11
-    )
+    np.testing.assert_allclose(plain.end.states, recorded.trajectory.end.states, rtol=0, atol=1e-11)
     assert plain.modes == recorded.phases
     assert plain.arcs == ()

@@ -111,9 +111,7 @@ def test_a_value_set_by_the_user_says_so() -> None:
         ("model = 3", "not a text"),
     ],
 )
-def test_a_malformed_file_is_refused_in_one_line(
-    tmp_path: Path, content: str, told: str
-) -> None:
+def test_a_malformed_file_is_refused_in_one_line(tmp_path: Path, content: str, told: str) -> None:
     file = tmp_path / "bad.toml"
     file.write_text(content)
     with pytest.raises(InputError) as refused:

@@ -55,7 +55,9 @@ def running_slip(height: float) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("height", "slope"), [(0.940267144380, -0.161308), (1.337686381370, 1.686968)]
 )
-def test_the_running_spring_mass_model_has_its_two_fixed_points(height: float, slope: float) -> None:
+def test_the_running_spring_mass_model_has_its_two_fixed_points(
+    height: float, slope: float
+) -> None:
     assert running_slip(height)["height"] == pytest.approx(height, abs=1e-9)
     step = 1e-5
     difference = running_slip(height + step)["height"] - running_slip(height - step)["height"]

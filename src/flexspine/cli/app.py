@@ -7,7 +7,6 @@ Exit codes: 0 done, 1 the run ended without its goal, 2 bad input, 3 the machine
 from __future__ import annotations
 
 import errno
-import os
 import sys
 from typing import Annotated, Any, NoReturn
 
@@ -17,6 +16,8 @@ from flexspine._version import __version__
 from flexspine.cli import bound, cache, equations, presets
 from flexspine.cli.output import fail
 from flexspine.errors import FlexspineError, InputError, MachineError
+
+INTERRUPTED = 130
 
 # Typer has carried its own click since 0.26 and used the installed one before.
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
@@ -69,14 +70,11 @@ def _run(arguments: list[str]) -> int:
     except FlexspineError as failure:
         return fail(failure, as_json)
     except (KeyboardInterrupt, typer.Abort):
-        print("flexspine: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # The reader went away; Python would complain once more while flushing at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        code = INTERRUPTED
     except OSError as failure:
         return fail(_disk(failure), as_json)
+    if code == INTERRUPTED:
+        print("flexspine: interrupted", file=sys.stderr)
     return code if isinstance(code, int) else 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +22,8 @@ def bound(
     apex: Apex = None,
     touchdown: Touchdown = None,
     strides: Annotated[
-        int | None, typer.Option(min=1, help="How many strides to run (1 unless --seconds is given).")
+        int | None,
+        typer.Option(min=1, help="How many strides to run (1 unless --seconds is given)."),
     ] = None,
     seconds: Annotated[
         float | None, typer.Option(help="Run this many seconds instead of counting strides.")
@@ -59,8 +61,9 @@ def bound(
         apex=assignments("--apex", apex),  # type: ignore[arg-type]  # checked by the model
         touchdown=assignments("--touchdown", touchdown),  # type: ignore[arg-type]
     )
-    directory = None if out is None else ResultDirectory(out)
-    with steps() as progress:
+    with ExitStack() as stack:
+        progress = stack.enter_context(steps())
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
         progress.begin("simulating")
         run = simulate(model, strides=strides, duration=seconds, tolerance=tolerance)
         record = run_record(run)
@@ -70,8 +73,8 @@ def bound(
         print_json(record)
     else:
         print(_report(record))
-        if directory is not None:
-            print(f"results in {directory.path}")
+        if out is not None:
+            print(f"results in {out}")
     return 0 if run.outcome.completed else 1
 
 

@@ -7,7 +7,7 @@ import json
 import shutil
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from flexspine.cli.output import Steps
 from flexspine.errors import OutputError
@@ -19,7 +19,8 @@ _OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 class ResultDirectory:
     """A place for results; made and tried out at once, so that no run is done in vain.
 
-    Raises `OutputError` if it cannot be written to.
+    A context: what was made for nothing is taken away at its end. Raises `OutputError` if it
+    cannot be written to.
     """
 
     def __init__(self, path: Path) -> None:
@@ -46,14 +47,17 @@ class ResultDirectory:
             _write_all(stage, run, record, interval, animation, progress)
             for file in sorted(stage.iterdir()):
                 file.replace(self.path / file.name)
-        except BaseException:
+        finally:
             shutil.rmtree(stage, ignore_errors=True)
-            self._remove_new()
-            raise
-        stage.rmdir()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self._remove_new()
 
     def _remove_new(self) -> None:
-        """Take away directories made for nothing."""
+        """Take away the new directories that are still empty."""
         for path in self._new:
             try:
                 path.rmdir()

@@ -12,10 +12,19 @@ import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 
-from flexspine.errors import MachineError, InputError, OutputError, ParameterError
+from flexspine.errors import InputError, MachineError, OutputError, ParameterError
 from flexspine.report.figure import ending, heading
 from flexspine.report.postures import Posture, postures
-from flexspine.report.scene import DOTS, Scene, View, add_force_key, draw_ground, pill
+from flexspine.report.scene import (
+    DOTS,
+    Scene,
+    View,
+    add_force_key,
+    draw_ground,
+    draw_strokes,
+    pill,
+    write,
+)
 from flexspine.report.stick_figure import Scale, StickFigure
 from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
 from flexspine.report.timeline import check_samples, last_cycle
@@ -32,7 +41,9 @@ MAX_FRAMES = 600
 MAX_RATE = 100  # frames per second; a GIF counts time in hundredths of a second
 
 MAX_POSTURES = 40
-CELL = 1.42  # in, the width of one posture
+PER_ROW = 5
+CELL = 1.9  # in, the width of one posture
+LABELS = 0.4  # in, below each row
 
 
 def animate(
@@ -116,63 +127,59 @@ def _encoder() -> dict[str, Any]:
 def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
     """Draw ``frames`` evenly spaced postures over the last apex-to-apex cycle, else the run.
 
-    The postures stand side by side; the way between them is not drawn. Raises `InputError`.
+    They stand side by side; the way between them is not drawn. Raises `InputError`.
     """
     check_samples(dataset)
     if not 1 <= frames <= MAX_POSTURES:
         raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
-    start, end = last_cycle(dataset)
-    shown = postures(dataset, np.linspace(start, end, frames))
+    shown = postures(dataset, np.linspace(*last_cycle(dataset), frames))
     scale = Scale.of(dataset)
     view = View.of(shown, scale)
-    left, right, foot, head = 0.62, 0.1, 0.86, 0.52  # in, around the postures
-    width = max(CELL * frames, 5.5 - left - right)
-    height = (view.high - view.low) * CELL / (2 * view.aside)
-    size = left + width + right, foot + height + head
+    metre = CELL / (2 * view.aside)  # in
+    height = (view.high - view.low) * metre
+    rows = [shown[i : i + PER_ROW] for i in range(0, frames, PER_ROW)]
+    width = max(len(rows[0]), 3) * CELL
     with themed():
-        figure = Figure(figsize=size)
-        axes = figure.add_axes(
-            (left / size[0], foot / size[1], width / size[0], height / size[1])
-        )
-        axes.set_xlim(-view.aside, -view.aside + 2 * view.aside * width / CELL)
-        draw_ground(axes, axes.get_xlim(), view, scale)
-        axes.set_ylabel("height (m)")
-        axes.spines["bottom"].set_visible(False)
-        axes.set_xticks([])
-        for number, posture in enumerate(shown):
-            middle = 2 * view.aside * number
-            animal = StickFigure(axes, scale, 72 * CELL / (2 * view.aside), posture)
-            animal.show(posture, middle - posture.com[0])
-            _label(axes, middle, posture)
-        add_force_key(figure, axes, scale, (left + 0.05, 0.2))
+        figure = Figure(figsize=(0.75 + width, 0.9 + len(rows) * (height + LABELS)))
+        size = figure.get_size_inches()
+        for number, row in enumerate(rows):
+            foot = size[1] - 0.5 - number * (height + LABELS) - height
+            axes = figure.add_axes(
+                (0.6 / size[0], foot / size[1], len(row) * CELL / size[0], height / size[1])
+            )
+            axes.set_xlim(-view.aside, (2 * len(row) - 1) * view.aside)
+            _draw_row(axes, row, view, scale, metre)
+        add_force_key(figure, (0.6, 0.2), scale, metre)
         _write_heading(figure, dataset, shown)
     return figure
 
 
-def _label(axes: Axes, middle: float, posture: Posture) -> None:
-    """Write phase and time under a posture."""
-    below = axes.get_xaxis_transform()
-    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": SMALL_SIZE}
-    offset = {"textcoords": "offset points", "xycoords": below, "annotation_clip": False}
-    axes.annotate(
-        posture.phase, (middle, 0), (0, -9), bbox=pill(posture.phase), fontweight="bold",
-        **offset, **style,
-    )  # fmt: skip
-    axes.annotate(f"{posture.time:.3f} s", (middle, 0), (0, -26), **offset, **style)
+def _draw_row(axes: Axes, row: list[Posture], view: View, scale: Scale, metre: float) -> None:
+    """Draw postures side by side, each with its phase and time (s) below."""
+    draw_ground(axes, view)
+    draw_strokes(axes, axes.get_xlim(), scale)
+    axes.set_ylabel("height (m)")
+    axes.spines["bottom"].set_visible(False)
+    axes.set_xticks([])
+    style: dict[str, Any] = {
+        "ha": "center", "va": "center", "fontsize": SMALL_SIZE, "annotation_clip": False,
+        "xycoords": axes.get_xaxis_transform(), "textcoords": "offset points",
+    }  # fmt: skip
+    for number, posture in enumerate(row):
+        middle = 2 * view.aside * number
+        StickFigure(axes, scale, 72 * metre, posture).show(posture, middle - posture.com[0])
+        box = pill(posture.phase)
+        axes.annotate(posture.phase, (middle, 0), (-20, -8), bbox=box, fontweight="bold", **style)
+        axes.annotate(f"{posture.time:.3f} s", (middle, 0), (14, -8), **style)
 
 
 def _write_heading(figure: Figure, dataset: xr.Dataset, shown: list[Posture]) -> None:
     width, height = figure.get_size_inches()
     early = ending(dataset)
-    title = heading(dataset) + (f" ({early})" if early else "")
-    figure.text(
-        0.12 / width, 1 - 0.2 / height, title,
-        fontsize=TITLE_SIZE, fontweight="bold", va="center",
-    )  # fmt: skip
-    first, last = shown[0], shown[-1]
-    figure.text(
-        1 - 0.12 / width, 0.2 / height,
-        f"side by side; it travels {last.com[0] - first.com[0]:.3g} m"
-        f" in {last.time - first.time:.3g} s",
-        ha="right", va="center", fontsize=SMALL_SIZE,
-    )  # fmt: skip
+    write(figure, (0.12, height - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
+    if early:
+        write(figure, (0.12, height - 0.4), early)
+    moved = shown[-1].com[0] - shown[0].com[0]
+    lasted = shown[-1].time - shown[0].time
+    told = f"side by side; from first to last {moved:.3g} m in {lasted:.3g} s"
+    write(figure, (width - 0.15, 0.2), told, ha="right")

@@ -1,4 +1,7 @@
-"""The stage of an animation: camera, ground, force key, phase bar and what is written around."""
+"""The scene of an animation: camera, ground, force key, phase bar and what is written around.
+
+What never changes is drawn once, as a backdrop; only what moves is drawn in every frame.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MultipleLocator
 
@@ -18,12 +22,13 @@ from flexspine.report.postures import Point, Posture, postures
 from flexspine.report.stick_figure import (
     ARROW_LENGTH,
     ARROW_WIDTH,
+    SPRING_RADIUS,
     Scale,
     StickFigure,
     arrow_outline,
     bend_color,
 )
-from flexspine.report.style import FAINT, INK, PHASE_COLORS, SMALL_SIZE, TITLE_SIZE
+from flexspine.report.style import FAINT, INK, PHASE_COLORS, SMALL_SIZE, TEXT_SIZE, TITLE_SIZE
 from flexspine.report.timeline import (
     PHASE_NAMES,
     draw_phase_bar,
@@ -35,6 +40,7 @@ from flexspine.report.timeline import (
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -42,9 +48,12 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 8.0, 5.2  # in
 DOTS = 100  # per in; makes both sizes even, as the video codec demands
 
-# in; the parts of the figure
-LEFT, RIGHT = 0.66, 0.2
-FOOT, HEAD = 1.16, 0.98
+# in; where the parts of the figure are
+LEFT, RIGHT, FOOT, HEAD = 0.66, 0.2, 1.16, 0.98
+STAGE = WIDTH - LEFT - RIGHT, HEIGHT - FOOT - HEAD
+BAR_FOOT, BAR_HEIGHT = 0.46, 0.2
+STATUS = HEIGHT - 0.78  # the line that tells phase, bend and time
+BEND = LEFT + 2.6
 
 
 @dataclass(frozen=True)
@@ -59,9 +68,7 @@ class View:
     def of(cls, shown: Sequence[Posture], scale: Scale) -> View:
         """Return the smallest view that holds all postures, their arrows and some air."""
         points = [
-            (abs(x - posture.com[0]), y)
-            for posture in shown
-            for x, y in _outline(posture, scale)
+            (abs(x - posture.com[0]), y) for posture in shown for x, y in _outline(posture, scale)
         ]
         air = 0.17 * scale.leg
         low = -(ARROW_LENGTH + 0.08) * scale.leg
@@ -78,7 +85,7 @@ class View:
 def _outline(posture: Posture, scale: Scale) -> Iterable[Point]:
     yield posture.com
     if posture.joint is not None:
-        yield posture.joint
+        yield posture.joint[0], posture.joint[1] + SPRING_RADIUS * scale.leg
     for leg in posture.legs.values():
         yield from (leg.hip, leg.toe)
         yield leg.toe[0] - scale.arrow * leg.force[0], leg.toe[1]
@@ -90,99 +97,135 @@ class Scene:
     def __init__(self, dataset: xr.Dataset, times: Array, slow_down: float) -> None:
         self.postures = postures(dataset, times)
         self.scale = Scale.of(dataset)
-        self.figure = Figure(figsize=(WIDTH, HEIGHT))
+        self.view = View.of(self.postures, self.scale).widened(STAGE[0] / STAGE[1])
+        self.limits = window(times)
+        self.figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
         FigureCanvasAgg(self.figure)
-        self._add_stage()
-        self._add_phases(dataset, times)
-        self._add_words(dataset, slow_down)
+        self.figure.figimage(_backdrop(self, dataset, slow_down))
+        self.axes = self._add_stage()
+        points = 72 * STAGE[0] / (2 * self.view.aside)
+        self.animal = StickFigure(self.axes, self.scale, points, self.postures[0])
+        self.cursor = Line2D([], [], color=INK, linewidth=2)
+        self.figure.add_artist(self.cursor)
+        self.phase = write(self.figure, (LEFT + 0.05, STATUS), "", fontweight="bold")
+        self.clock = write(self.figure, (WIDTH - RIGHT, STATUS), "", fontweight="bold", ha="right")
+        self.bend = write(self.figure, (BEND, STATUS), "")
+        self.swatch = square(self.figure, (BEND - 0.15, STATUS))
+        self.swatch.set_visible(self.postures[0].bend is not None)
 
     def show(self, posture: Posture) -> None:
         """Bring the figure to a posture, the CoM in the middle."""
         x = posture.com[0]
         self.axes.set_xlim(x - self.view.aside, x + self.view.aside)
         self.animal.show(posture)
-        self.cursor.set_xdata([posture.time, posture.time])
+        passed = (posture.time - self.limits[0]) / (self.limits[1] - self.limits[0])
+        low, high = BAR_FOOT - 0.05, BAR_FOOT + BAR_HEIGHT + 0.05
+        self.cursor.set_data(
+            [(LEFT + passed * STAGE[0]) / WIDTH] * 2, [low / HEIGHT, high / HEIGHT]
+        )
         self.clock.set_text(f"t = {posture.time:.3f} s")
         self.phase.set_text(f"{posture.phase}: {PHASE_NAMES[posture.phase]}")
         self.phase.set_bbox(pill(posture.phase))
         if posture.bend is not None:
-            way = "sags" if posture.bend > 0 else "arches"
-            self.bend.set_text(f"spine {way}, bend {np.degrees(posture.bend):+.1f}°")
+            self.bend.set_text(tell_bend(posture.bend))
             self.swatch.set_facecolor(bend_color(posture.bend, self.scale))
 
-    def _add_stage(self) -> None:
-        width, height = WIDTH - LEFT - RIGHT, HEIGHT - FOOT - HEAD
-        self.axes = self.figure.add_axes(
-            (LEFT / WIDTH, FOOT / HEIGHT, width / WIDTH, height / HEIGHT)
-        )
-        self.view = View.of(self.postures, self.scale).widened(width / height)
+    def _add_stage(self) -> Axes:
+        """The axes that move along, with nothing of their own but positions."""
+        axes = _stage(self.figure, self.view)
+        axes.patch.set_visible(False)
+        axes.spines[:].set_visible(False)
+        axes.yaxis.set_visible(False)
         x = [posture.com[0] for posture in self.postures]
         aside = self.view.aside
-        draw_ground(self.axes, (min(x) - aside, max(x) + aside), self.view, self.scale)
-        self.axes.xaxis.set_major_locator(MultipleLocator(round_down(2 * aside / 5)))
-        self.axes.set_xlabel("position (m)", labelpad=1)
-        self.axes.set_ylabel("height (m)")
-        points = 72 * width / (2 * aside)
-        self.animal = StickFigure(self.axes, self.scale, points, self.postures[0])
-        self.axes.set_xlim(x[0] - aside, x[0] + aside)
-        add_force_key(self.figure, self.axes, self.scale, (LEFT + 0.12, FOOT + 0.2))
-
-    def _add_phases(self, dataset: xr.Dataset, times: Array) -> None:
-        width = WIDTH - LEFT - RIGHT
-        bar = self.figure.add_axes((LEFT / WIDTH, 0.46 / HEIGHT, width / WIDTH, 0.2 / HEIGHT))
-        spans = phase_spans(dataset)
-        draw_phase_bar(bar, spans, window(times))
-        label_phases(bar, spans, width)
-        bar.set_xlabel("time (s)", labelpad=1)
-        (self.cursor,) = bar.plot([times[0]] * 2, [-0.2, 1.2], color=INK, lw=2, clip_on=False)
-
-    def _add_words(self, dataset: xr.Dataset, slow_down: float) -> None:
-        def write(x: float, down: float, text: str, **style: Any) -> Any:
-            style = {"fontsize": SMALL_SIZE, "va": "center", **style}
-            return self.figure.text(x / WIDTH, 1 - down / HEIGHT, text, **style)
-
-        write(0.15, 0.2, heading(dataset), fontsize=TITLE_SIZE, fontweight="bold")
-        early = ending(dataset)
-        facts = describe(dataset)[0] + (f"  ·  {early}" if early else "")
-        write(0.15, 0.44, facts)
-        self.phase = write(LEFT, 0.78, "", fontweight="bold")
-        self.bend = write(LEFT + 2.6, 0.78, "")
-        self.clock = write(WIDTH - RIGHT, 0.78, "", ha="right", fontweight="bold")
-        write(WIDTH - RIGHT, 0.2, f"{slow_down:g} times slower than real", ha="right")
-        if self.postures[0].bend is not None:
-            x, y, side = (LEFT + 2.4) / WIDTH, 1 - 0.78 / HEIGHT, 0.07
-            corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-            box = [(x + a * side / WIDTH, y + b * side / HEIGHT) for a, b in corners]
-            self.swatch = Polygon(box, transform=self.figure.transFigure, edgecolor=INK, lw=0.7)
-            self.figure.add_artist(self.swatch)
+        draw_strokes(axes, (min(x) - aside, max(x) + aside), self.scale)
+        axes.xaxis.set_major_locator(MultipleLocator(round_down(2 * aside / 5)))
+        return axes
 
 
-def draw_ground(axes: Axes, reach: tuple[float, float], view: View, scale: Scale) -> None:
-    """Draw the ground over ``reach`` (m), with strokes that show how it passes."""
+def _backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArray[np.uint8]:
+    figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
+    canvas = FigureCanvasAgg(figure)
+    axes = _stage(figure, scene.view)
+    draw_ground(axes, scene.view)
+    axes.tick_params(bottom=False, labelbottom=False)
+    axes.set_ylabel("height (m)")
+    write(figure, (LEFT + STAGE[0] / 2, FOOT - 0.3), "position (m)", size=TEXT_SIZE, ha="center")
+    add_force_key(figure, (LEFT, FOOT - 0.31), scene.scale, STAGE[0] / (2 * scene.view.aside))
+    box = (LEFT / WIDTH, BAR_FOOT / HEIGHT, STAGE[0] / WIDTH, BAR_HEIGHT / HEIGHT)
+    bar = figure.add_axes(box)
+    spans = phase_spans(dataset)
+    draw_phase_bar(bar, spans, scene.limits)
+    label_phases(bar, spans, STAGE[0])
+    bar.set_xlabel("time (s)", labelpad=1)
+    early = ending(dataset)
+    facts = describe(dataset)[0] + (f"  ·  {early}" if early else "")
+    write(figure, (0.15, HEIGHT - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
+    write(figure, (0.15, HEIGHT - 0.44), facts)
+    slowness = f"{slow_down:g} times slower than real"
+    write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), slowness, ha="right")
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())
+
+
+def _stage(figure: Figure, view: View) -> Axes:
+    box = (LEFT / WIDTH, FOOT / HEIGHT, STAGE[0] / WIDTH, STAGE[1] / HEIGHT)
+    axes = figure.add_axes(box)
+    axes.set_xlim(-view.aside, view.aside)
+    axes.set_ylim(view.low, view.high)
+    return axes
+
+
+def draw_ground(axes: Axes, view: View) -> None:
+    """Draw the ground, and heights only above it."""
     axes.set_ylim(view.low, view.high)
     axes.set_yticks([y for y in axes.get_yticks() if 0 <= y <= view.high])
+    axes.spines["left"].set_bounds(0, view.high)
     axes.axhline(0, color=INK, linewidth=1.0, zorder=2.5)
-    step = round_down(0.4 * scale.leg)
+
+
+def draw_strokes(axes: Axes, reach: tuple[float, float], scale: Scale) -> None:
+    """Draw strokes in the ground over ``reach`` (m), which show how it passes."""
+    step = round_down(0.3 * scale.leg)
     x = step * np.arange(np.floor(reach[0] / step), np.ceil(reach[1] / step) + 1)
-    depth = 0.4 * step
+    depth = 0.35 * step
     strokes = [[(at, 0.0), (at - depth, -depth)] for at in x]
     axes.add_collection(LineCollection(strokes, colors=FAINT, linewidths=0.8, zorder=1))
 
 
-def add_force_key(figure: Figure, axes: Axes, scale: Scale, place: Point) -> None:
-    """Draw an arrow of a round force at ``place`` (in), to the scale of those at the toes."""
-    size = figure.get_size_inches()
-    low, high = axes.get_xlim()
-    metre = axes.get_position().width * size[0] / (high - low)  # in
+def add_force_key(figure: Figure, place: Point, scale: Scale, metre: float) -> None:
+    """Draw an arrow of a round force at ``place``, where a metre is ``metre`` long (both in in)."""
     force = round_down(scale.force)
-    length, width = metre * scale.arrow * force, metre * ARROW_WIDTH * scale.leg
-    outline = arrow_outline(np.zeros(2), np.array([length, 0.0]), width) + place
-    arrow = Polygon(outline / size, transform=figure.transFigure, facecolor=INK, lw=0)
-    figure.add_artist(arrow)
-    figure.text(
-        (place[0] + length + 0.08) / size[0], place[1] / size[1],
-        f"{force:g} N per leg pair, on the toe", va="center", fontsize=SMALL_SIZE,
-    )  # fmt: skip
+    tip = np.array([metre * scale.arrow * force, 0.0])
+    outline = arrow_outline(np.zeros(2), tip, metre * ARROW_WIDTH * scale.leg) + place
+    corners = outline / figure.get_size_inches()
+    figure.add_artist(Polygon(corners, transform=figure.transFigure, facecolor=INK, linewidth=0))
+    write(figure, (place[0] + tip[0] + 0.08, place[1]), f"{force:g} N per leg pair")
+
+
+def square(figure: Figure, place: Point) -> Polygon:
+    """Draw a small square around ``place`` (in) and return it."""
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    box = (np.array(place) + 0.07 * corners) / figure.get_size_inches()
+    patch = Polygon(box, transform=figure.transFigure, edgecolor=INK, linewidth=0.7)
+    figure.add_artist(patch)
+    return patch
+
+
+def write(
+    figure: Figure, place: Point, text: str, *, size: float = SMALL_SIZE, **style: Any
+) -> Text:
+    """Write a line whose middle is at the height of ``place`` (in)."""
+    x, y = np.array(place) / figure.get_size_inches()
+    return figure.text(x, y, text, fontsize=size, va="center", **style)
+
+
+def tell_bend(bend: float) -> str:
+    """Return a bend of the spine (rad) in words, without a sign for next to nothing."""
+    degrees = round(float(np.degrees(bend)), 1)
+    if not degrees:
+        return "spine straight"
+    return f"spine {'sags' if degrees > 0 else 'arches'} by {abs(degrees):.1f}°"
 
 
 def pill(phase: str) -> dict[str, Any]:
@@ -192,5 +235,5 @@ def pill(phase: str) -> dict[str, Any]:
 
 def round_down(value: float) -> float:
     """Return the largest 1, 2 or 5 times a power of ten that is not above ``value``."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)) * power)
+    power = float(10.0 ** np.floor(np.log10(value)))
+    return max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)) * power

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.path import Path as Outline
@@ -25,13 +25,14 @@ if TYPE_CHECKING:
 BODY_COLOR = "#5A5A5A"
 ARROW_COLOR = INK
 
-ZIGZAGS = 6
-SPRING_TURNS = 1.6
+ZIGZAGS = 11  # corners of a leg's spring
+WAVES = 5  # of the spine's spring
 
 # Sizes in lengths of the leg.
 ZIGZAG_WIDTH = 0.14
 TRUNK_WIDTH = 0.15
-SPRING_RADIUS = 0.115
+SPRING_RADIUS = 0.24
+SPRING_WAVE = 0.055
 ARROW_LENGTH = 0.62  # of the largest force
 ARROW_WIDTH = 0.045
 
@@ -67,9 +68,7 @@ class StickFigure:
     ``points_per_metre`` is how large a metre is drawn, so that lines keep their proportions.
     """
 
-    def __init__(
-        self, axes: Axes, scale: Scale, points_per_metre: float, example: Posture
-    ) -> None:
+    def __init__(self, axes: Axes, scale: Scale, points_per_metre: float, example: Posture) -> None:
         self.axes, self.scale = axes, scale
         self.unit = scale.leg * points_per_metre  # pt per length of the leg
         self.jointed = example.joint is not None
@@ -79,8 +78,8 @@ class StickFigure:
         self.toes = {side: self._dot(4, 0.055, SIDE_COLORS[side]) for side in SIDES}
         self.hips = {side: self._dot(6, 0.085, "white", SIDE_COLORS[side]) for side in SIDES}
         if self.jointed:
-            self.disc = self._dot(7, 2.3 * SPRING_RADIUS, "white", INK)
-            self.spring = self._line(8, width=0.032)
+            self.joint = self._dot(7, 0.085, "white", INK)
+            self.spring = (self._line(8, width=0.058), self._line(8.1, width=0.032))
         self.com = (self._dot(9, 0.1, "white", INK), self._com_quarters())
 
     def show(self, posture: Posture, shift: float = 0.0) -> None:
@@ -115,13 +114,16 @@ class StickFigure:
         arrow.set_xy(arrow_outline(toe - force, toe, ARROW_WIDTH * self.scale.leg))
 
     def _show_spring(self, posture: Posture, joint: Point, bend: float, shift: float) -> None:
+        centre = np.array(joint) + (shift, 0.0)
         fore, hind = (np.array(posture.legs[side].hip) - joint for side in SIDES)
-        inner = float(np.arctan2(hind[1], hind[0]))
-        outer = float(np.arctan2(fore[1], fore[0]))
-        curve = spiral(inner, outer, SPRING_RADIUS * self.scale.leg)
-        self.spring.set_data(curve[:, 0] + joint[0] + shift, curve[:, 1] + joint[1])
-        self.spring.set_color(bend_color(bend, self.scale))
-        self.disc.set_data([joint[0] + shift], [joint[1]])
+        start = float(np.arctan2(fore[1], fore[0]))
+        # Over the back from fore to hind, however the body is turned.
+        turn = (float(np.arctan2(hind[1], hind[0])) - start) % (2 * np.pi)
+        curve = centre + wavy_arc(start, turn) * self.scale.leg
+        for line in self.spring:
+            line.set_data(*curve.T)
+        self.spring[1].set_color(bend_color(bend, self.scale))
+        self.joint.set_data([centre[0]], [centre[1]])
 
     def _line(self, order: float, *, color: str = INK, width: float = 0.034) -> Line2D:
         line = Line2D(
@@ -170,30 +172,32 @@ def zigzag(start: Array, end: Array, width: float) -> Array:
     along = end - start
     length = float(np.hypot(*along))
     across = np.array([-along[1], along[0]]) / length if length else np.zeros(2)
-    teeth = np.linspace(0.22, 0.82, 2 * ZIGZAGS + 1)
-    sideways = np.resize([0.0, 1.0, 0.0, -1.0], len(teeth)) * width / 2
-    body = start + np.outer(teeth, along) + np.outer(sideways, across)
+    corners = np.linspace(0.15, 0.86, ZIGZAGS)
+    sideways = np.resize([1.0, -1.0], ZIGZAGS) * width / 2
+    sideways[[0, -1]] = 0.0
+    body = start + np.outer(corners, along) + np.outer(sideways, across)
     return np.vstack([start, body, end])
 
 
-def spiral(inner: float, outer: float, radius: float) -> Array:
-    """A coil from the direction ``inner`` to ``outer`` (rad) around the origin."""
-    turn = (outer - inner) % (2 * np.pi) + 2 * np.pi * (SPRING_TURNS // 1)
-    along = np.linspace(0.0, 1.0, 80)
-    angle = inner + turn * along
-    size = radius * (0.35 + 0.6 * along)
-    return np.column_stack([size * np.cos(angle), size * np.sin(angle)])
+def wavy_arc(start: float, turn: float) -> Array:
+    """A spring bent around the origin from ``start`` on (rad), in lengths of the leg."""
+    along = np.linspace(0.0, 1.0, 90)
+    coiled = ((along - 0.12) / 0.76).clip(0, 1)  # smooth ends
+    radius = SPRING_RADIUS + SPRING_WAVE * np.sin(2 * np.pi * WAVES * coiled)
+    angle = start + turn * along
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 
 
 def arrow_outline(tail: Array, tip: Array, width: float) -> Array:
-    """An arrow as a polygon of 7 corners; its head is never longer than the arrow."""
+    """An arrow as a polygon of 7 corners; a short one is thin."""
     along = tip - tail
     length = float(np.hypot(*along))
     if not length:
         return np.tile(tip, (7, 1))
     ahead = along / length
+    width = min(width, length / 3.2)
     side = np.array([-ahead[1], ahead[0]]) * width / 2
-    neck = tip - ahead * min(2.2 * width, length)
+    neck = tip - ahead * 2.2 * width
     corners = [
         tail + side, neck + side, neck + 2.2 * side, tip,
         neck - 2.2 * side, neck - side, tail - side,
@@ -214,6 +218,4 @@ def _pairs(nodes: list[Point]) -> Iterable[tuple[Point, Point]]:
 
 
 def _paler(color: str) -> tuple[float, ...]:
-    from matplotlib.colors import to_rgb
-
     return tuple(1 - 0.45 * (1 - part) for part in to_rgb(color))

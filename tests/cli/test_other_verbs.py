@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import flexspine
+from flexspine.cli import results
+from tests.cli.conftest import Cli
+
+
+def test_presets_are_listed_with_their_source(cli: Cli) -> None:
+    done = cli("presets")
+    assert done.returncode == 0
+    for name in flexspine.preset_names():
+        assert name in done.stdout
+    assert "Poulakakis" in done.stdout
+    rows = json.loads(cli("presets", "--json").stdout)["presets"]
+    assert {row["name"] for row in rows} == set(flexspine.preset_names())
+
+
+def test_a_preset_shows_every_value_with_unit_and_provenance(cli: Cli) -> None:
+    done = cli("presets", "kamimura2015-flexible")
+    assert "printed 0.069 m; doubled" in done.stdout
+    assert "doubt: " in done.stdout
+    record = json.loads(cli("presets", "kamimura2015-flexible", "--json").stdout)
+    table = {row["name"]: row for row in record["values"]}
+    assert table["spine.stiffness"]["value"] == 260
+    assert table["spine.stiffness"]["unit"] == "N m/rad"
+    assert table["apex.fore_pitch_rate"]["unit"] == "rad/s"
+    assert all(row["provenance"] and row["unit"] for row in record["values"])
+
+
+def test_an_unknown_preset_is_refused(cli: Cli) -> None:
+    done = cli("presets", "scout3")
+    assert done.returncode == 2
+    assert "did you mean 'scout2'?" in done.stderr
+
+
+def test_equations_are_printed_for_models_and_presets(cli: Cli) -> None:
+    done = cli("equations", "flexible-bounder")
+    assert done.returncode == 0
+    assert "Kinetic and potential energy" in done.stdout
+    assert r"\ddot{\theta}_{f}" in done.stdout
+    record = json.loads(cli("equations", "scout2", "--phase", "FS", "--json").stdout)
+    assert record["model"] == "rigid-bounder"
+    assert "s_h" not in record["text"], "the hind leg is in the air"
+    assert cli("equations", "flexible-bounder", "--format", "text").stdout.count("\\[") == 0
+
+
+@pytest.mark.parametrize("arguments", [["flexible-boundr"], ["rigid-bounder", "--phase", "XX"]])
+def test_equations_of_nothing_are_refused(cli: Cli, arguments: list[str]) -> None:
+    done = cli("equations", *arguments)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+
+
+def test_equations_print_where_unicode_cannot(cli: Cli) -> None:
+    done = cli("equations", "rigid-bounder", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.returncode == 0
+    assert done.stdout.isascii()
+
+
+def test_the_cache_can_be_cleared(cli: Cli, tmp_path: Path) -> None:
+    own = str(tmp_path / "cache")
+    assert cli("bound", "--json", FLEXSPINE_CACHE_DIR=own).returncode == 0
+    cleared = json.loads(cli("cache", "clear", "--json", FLEXSPINE_CACHE_DIR=own).stdout)
+    assert cleared["freed_bytes"] > 100_000
+    assert not (tmp_path / "cache").exists()
+    assert cli("cache", "clear", FLEXSPINE_CACHE_DIR=own).returncode == 0
+
+
+def test_help_has_an_example_for_every_verb(cli: Cli) -> None:
+    for verb in (["bound"], ["presets"], ["equations"], ["cache", "clear"]):
+        done = cli(*verb, "--help")
+        assert done.returncode == 0
+        assert f"flexspine {' '.join(verb)}" in done.stdout
+
+
+def test_the_version_is_told(cli: Cli) -> None:
+    assert cli("--version").stdout.strip() == flexspine.__version__
+
+
+def test_a_full_disk_is_exit_code_3_and_keeps_older_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from flexspine.cli import app
+
+    kept = tmp_path / "results" / "summary.json"
+    kept.parent.mkdir()
+    kept.write_text("older")
+
+    def full(stage: Path, *_rest: object) -> None:
+        (stage / "trajectory.nc").write_text("half")
+        raise OSError(28, "No space left on device", "trajectory.nc")
+
+    monkeypatch.setattr(results, "_write_all", full)
+    assert app._run(["bound", "--out", str(kept.parent)]) == 3
+    assert "No space left" in capsys.readouterr().err
+    assert [path.name for path in kept.parent.iterdir()] == ["summary.json"]
+    assert kept.read_text() == "older"
