@@ -53,7 +53,7 @@ def test_dampers_and_forces_do_virtual_work() -> None:
 
 
 def test_the_flexible_body_is_diagonal_in_mean_and_half_bend() -> None:
-    """T = m_s(x'^2+y'^2) + (J + m_s a^2 cos^2 p) t'^2 + (J + m_s a^2 sin^2 p) p'^2, equal halves."""
+    """T = m_s v^2 + (J + m_s a^2 cos^2 p) t'^2 + (J + m_s a^2 sin^2 p) p'^2 for equal halves."""
     body = FLEXIBLE_BOUNDER.body(False)
     system = lagrangian(body)
     m, J, a, t, p, vt, vp = sp.symbols("m_s J a t p vt vp", real=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -80,7 +82,7 @@ def test_momentum_changes_by_the_impulse_of_gravity_and_ground(preset: Model) ->
     edges = np.array([0.0, *(event.time for event in run.trajectory.events)])
     impulse = np.zeros(2)
     nodes, weights = np.polynomial.legendre.leggauss(40)
-    for left, right in zip(edges[:-1], edges[1:], strict=True):
+    for left, right in pairwise(edges):
         times = left + (right - left) * (nodes + 1) / 2
         data = to_dataset(run, times=times)
         for axis, name in enumerate(("grf_x", "grf_y")):

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -149,7 +150,7 @@ def test_the_random_runs_visit_every_phase_and_both_orders() -> None:
     for seed in range(24):
         model, _ = flexible(np.random.default_rng(seed), damped=False)
         phases = simulate(model).phases
-        seen |= set(zip(phases[:-1], phases[1:], strict=True))
+        seen |= set(pairwise(phases))
     assert {("DF", "FS"), ("DF", "HS"), ("FS", "DS"), ("HS", "DS"), ("DS", "HS"), ("DS", "FS")} <= (
         seen
     )

@@ -34,13 +34,6 @@ def written_out(system: Lagrangian) -> list[Line]:
             Heading("Rayleigh's dissipation function"),
             _equation(R, system.dissipation),
         ]
-    for force in system.forces:
-        (fx, fy), (px, py) = force.components, force.point
-        lines += [
-            Heading(f"Force of a leg on the body at ({px}, {py})"),
-            _equation(sp.Symbol(f"F_{px}"), fx),
-            _equation(sp.Symbol(f"F_{py}"), fy),
-        ]
     if system.definitions:
         lines.append(Heading("with"))
         lines += [_equation(symbol, value) for symbol, value in system.definitions.items()]

@@ -96,12 +96,11 @@ class StanceLeg:
             self.rate = stretching
             strain -= leg.c / leg.k * stretching * inverse
         self.definitions[sigma] = strain
-
-    @property
-    def force(self) -> AppliedForce:
-        """The force of the leg on its hip; the ground reaction force has the same components."""
-        load = self.leg.k * self.sigma
-        return AppliedForce((load * self.u, load * self.hip[1]), self.hip)
+        pushes = sp.symbols(f"F_{s}x F_{s}y", real=True)
+        for push, along in zip(pushes, (u, hip[1]), strict=True):
+            self.definitions[push] = leg.k * sigma * along
+        # The force of the leg on its hip; the ground reaction force has the same components.
+        self.force = AppliedForce(pushes, hip)
 
     @property
     def energy(self) -> sp.Expr:
@@ -125,15 +124,14 @@ class StanceLeg:
     def observables(self) -> dict[str, sp.Expr]:
         """Toe, length, angle and ground reaction force."""
         side, leg, (_, height) = self.leg.side, self.leg, self.hip
-        load = leg.k * self.sigma
         return {
             f"{side}_toe_x": leg.toe,
             f"{side}_toe_y": sp.S.Zero,
             f"{side}_leg_length": 1 / self.inverse,
             f"{side}_leg_angle": sp.atan2(-self.u, height),
-            f"{side}_grf_x": load * self.u,
-            f"{side}_grf_y": load * height,
-            f"{side}_grf": load / self.inverse,
+            f"{side}_grf_x": self.force.components[0],
+            f"{side}_grf_y": self.force.components[1],
+            f"{side}_grf": leg.k * self.sigma / self.inverse,
         }
 
 

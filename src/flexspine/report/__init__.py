@@ -1,1 +1,1 @@
-"""Pictures of runs: figures over time, strips of postures, animations. Nothing is simulated here."""
+"""Pictures of runs: figures over time, strips of postures, animations. Simulates nothing."""

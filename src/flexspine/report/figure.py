@@ -159,9 +159,7 @@ def _add_title(figure: Figure, dataset: xr.Dataset, details: list[str], height: 
             0.015, 1 - (0.14 + LINE * number + (0.05 if number else 0)) / total, text,
             fontsize=size, fontweight=weight, va="top", in_layout=False,
         )  # fmt: skip
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.set(rect=(0, 0, 1, 1 - height / total))
+    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - height / total))
 
 
 def _draw_height(axes: Axes, dataset: xr.Dataset) -> None:
@@ -248,7 +246,7 @@ def _shares(dataset: xr.Dataset) -> dict[str, Array]:
     }
 
 
-def _event_lines(dataset: xr.Dataset) -> list[tuple[str, str, Array]]:
+def _event_lines(dataset: xr.Dataset) -> list[tuple[Any, str, Array]]:
     """Line style, name and times (s) of the events, without those too many to be told apart."""
     times = dataset["event_time"].values
     kinds = dataset["event_kind"].values.astype(str)

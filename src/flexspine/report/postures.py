@@ -94,7 +94,8 @@ def postures(dataset: xr.Dataset, times: Array) -> list[Posture]:
 
 
 def _at(dataset: xr.Dataset, name: str, times: Array) -> Array:
-    return np.interp(times, dataset["time"].values, dataset[name].values)
+    values: Array = np.interp(times, dataset["time"].values, dataset[name].values)
+    return values
 
 
 def _points(dataset: xr.Dataset, name: str, times: Array) -> list[Point]:

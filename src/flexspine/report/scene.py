@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-WIDTH, HEIGHT = 8.0, 5.2  # in
+WIDTH, HEIGHT = 8.0, 5.3  # in
 DOTS = 100  # per in; makes both sizes even, as the video codec demands
 
 # in; where the parts of the figure are
-LEFT, RIGHT, FOOT, HEAD = 0.66, 0.2, 1.16, 0.98
+LEFT, RIGHT, FOOT, HEAD = 0.66, 0.2, 1.26, 0.98
 STAGE = WIDTH - LEFT - RIGHT, HEIGHT - FOOT - HEAD
 BAR_FOOT, BAR_HEIGHT = 0.46, 0.2
 STATUS = HEIGHT - 0.78  # the line that tells phase, bend and time
@@ -101,7 +101,7 @@ class Scene:
         self.limits = window(times)
         self.figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
         FigureCanvasAgg(self.figure)
-        self.figure.figimage(_backdrop(self, dataset, slow_down))
+        self.figure.figimage(_backdrop(self, dataset, slow_down), zorder=-1)
         self.axes = self._add_stage()
         points = 72 * STAGE[0] / (2 * self.view.aside)
         self.animal = StickFigure(self.axes, self.scale, points, self.postures[0])
@@ -145,13 +145,12 @@ class Scene:
 
 def _backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArray[np.uint8]:
     figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
-    canvas = FigureCanvasAgg(figure)
     axes = _stage(figure, scene.view)
     draw_ground(axes, scene.view)
     axes.tick_params(bottom=False, labelbottom=False)
     axes.set_ylabel("height (m)")
-    write(figure, (LEFT + STAGE[0] / 2, FOOT - 0.3), "position (m)", size=TEXT_SIZE, ha="center")
-    add_force_key(figure, (LEFT, FOOT - 0.31), scene.scale, STAGE[0] / (2 * scene.view.aside))
+    write(figure, (LEFT + STAGE[0] / 2, FOOT - 0.37), "position (m)", size=TEXT_SIZE, ha="center")
+    add_force_key(figure, (LEFT, FOOT - 0.375), scene.scale, STAGE[0] / (2 * scene.view.aside))
     box = (LEFT / WIDTH, BAR_FOOT / HEIGHT, STAGE[0] / WIDTH, BAR_HEIGHT / HEIGHT)
     bar = figure.add_axes(box)
     spans = phase_spans(dataset)
@@ -164,6 +163,7 @@ def _backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArray[np
     write(figure, (0.15, HEIGHT - 0.44), facts)
     slowness = f"{slow_down:g} times slower than real"
     write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), slowness, ha="right")
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba())
 

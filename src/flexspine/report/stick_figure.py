@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, to_rgb
+from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.path import Path as Outline
@@ -79,14 +79,14 @@ class StickFigure:
         self.hips = {side: self._dot(6, 0.085, "white", SIDE_COLORS[side]) for side in SIDES}
         if self.jointed:
             self.joint = self._dot(7, 0.085, "white", INK)
-            self.spring = (self._line(8, width=0.058), self._line(8.1, width=0.032))
+            self.spring = (self._line(8, width=0.052), self._line(8.1, width=0.03))
         self.com = (self._dot(9, 0.1, "white", INK), self._com_quarters())
 
     def show(self, posture: Posture, shift: float = 0.0) -> None:
         """Move to a posture, ``shift`` m ahead of where it is."""
         ends = [posture.legs[side].hip for side in ("hind", "fore")]
         nodes = [ends[0], posture.joint, ends[1]] if posture.joint is not None else ends
-        for lines, (start, end) in zip(self.trunk, _pairs(nodes), strict=True):
+        for lines, (start, end) in zip(self.trunk, pairwise(nodes), strict=True):
             for line in lines:
                 line.set_data([start[0] + shift, end[0] + shift], [start[1], end[1]])
         for side, leg in posture.legs.items():
@@ -97,8 +97,7 @@ class StickFigure:
             artist.set_data([posture.com[0] + shift], [posture.com[1]])
 
     def _show_leg(self, side: str, leg: LegPosture, shift: float) -> None:
-        hip = np.array(leg.hip) + (shift, 0.0)
-        toe = np.array(leg.toe) + (shift, 0.0)
+        hip, toe = _moved(leg.hip, shift), _moved(leg.toe, shift)
         # A leg in the air carries nothing: thin and pale.
         line, dot = self.legs[side], self.toes[side]
         width = ZIGZAG_WIDTH * self.scale.leg * (1.0 if leg.stands else 0.6)
@@ -114,7 +113,7 @@ class StickFigure:
         arrow.set_xy(arrow_outline(toe - force, toe, ARROW_WIDTH * self.scale.leg))
 
     def _show_spring(self, posture: Posture, joint: Point, bend: float, shift: float) -> None:
-        centre = np.array(joint) + (shift, 0.0)
+        centre = _moved(joint, shift)
         fore, hind = (np.array(posture.legs[side].hip) - joint for side in SIDES)
         start = float(np.arctan2(fore[1], fore[0]))
         # Over the back from fore to hind, however the body is turned.
@@ -213,9 +212,10 @@ def bend_color(bend: float, scale: Scale) -> tuple[float, float, float, float]:
     return _BENDS(0.5 + 0.5 * bend / scale.bend)
 
 
-def _pairs(nodes: list[Point]) -> Iterable[tuple[Point, Point]]:
-    return zip(nodes[:-1], nodes[1:], strict=True)
+def _moved(point: Point, shift: float) -> Array:
+    return np.array([point[0] + shift, point[1]])
 
 
-def _paler(color: str) -> tuple[float, ...]:
-    return tuple(1 - 0.45 * (1 - part) for part in to_rgb(color))
+def _paler(color: str) -> str:
+    red, green, blue = (1 - 0.45 * (1 - part) for part in to_rgb(color))
+    return to_hex((red, green, blue))

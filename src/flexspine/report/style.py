@@ -79,5 +79,6 @@ def themed(changes: dict[str, Any] | None = None) -> Iterator[None]:
 
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update({**_SETTINGS, **(changes or {})})
+        settings: Any = {**_SETTINGS, **(changes or {})}
+        mpl.rcParams.update(settings)
         yield

@@ -1,0 +1,197 @@
+"""Speed as ratios: `python -m benchmarks` prints one table and writes results/benchmarks.json.
+
+Every ratio is the median over rounds in which both sides take turns, so a drifting machine
+weighs on both alike.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import hand_field, scipy_peer
+from flexspine import load_model
+from flexspine.hybrid.integrate import integrate
+
+ROUNDS = 7
+
+
+def seconds(work: Callable[[], object], repeats: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(repeats):
+        work()
+    return (time.perf_counter() - begin) / repeats
+
+
+def in_turn(*jobs: tuple[Callable[[], object], int]) -> list[list[float]]:
+    """Time the jobs round by round; returns one row of seconds per round."""
+    for work, _ in jobs:
+        work()
+    return [[seconds(work, repeats) for work, repeats in jobs] for _ in range(ROUNDS)]
+
+
+def ratio(rows: list[list[float]], slow: int, fast: int) -> float:
+    return statistics.median(row[slow] / row[fast] for row in rows)
+
+
+def median(rows: list[list[float]], column: int) -> float:
+    return statistics.median(row[column] for row in rows)
+
+
+def stride_benchmark() -> dict[str, object]:
+    """One stride with events, core call, against SciPy at no better achieved error."""
+    model = load_model("kamimura2015-flexible")
+    start = model.apex_state()
+
+    def core(tolerance: float) -> Callable[[], object]:
+        bound = model.bind(tolerance)
+        return lambda: integrate(bound, start, crossings=1)
+
+    exact = np.array(scipy_peer.START)
+
+    def my_error(tolerance: float) -> float:
+        end = integrate(model.bind(tolerance), start, crossings=1).end.states
+        return float(np.max(np.abs(end[1:8] - exact[1:])))
+
+    def peer_error(method: str, tolerance: float) -> float:
+        return float(np.max(np.abs(scipy_peer.stride(method, tolerance)[1][1:] - exact[1:])))
+
+    peers = {
+        "SciPy DOP853, scalar math (fair)": ("DOP853", 1e-11, scipy_peer.scalar_field),
+        "SciPy DOP853, NumPy style": ("DOP853", 1e-11, scipy_peer.numpy_field),
+        "SciPy RK45 (ODE45), scalar math": ("RK45", 1e-12, scipy_peer.scalar_field),
+    }
+    rows_out = []
+    for name, (method, tolerance, field) in peers.items():
+        error = peer_error(method, tolerance)
+        # The loosest tolerance with which flexspine is at least as exact as the peer.
+        matched = next(
+            (t for t in (1e-8, 1e-9, 1e-10, 1e-11, 1e-12) if my_error(t) <= error), 1e-12
+        )
+        rows = in_turn(
+            (core(matched), 300),
+            (lambda m=method, t=tolerance, f=field: scipy_peer.stride(m, t, f), 3),
+            (core(1e-12), 300),
+        )
+        rows_out.append(
+            {
+                "peer": name,
+                "peer_tolerance": tolerance,
+                "peer_error": error,
+                "peer_ms": 1e3 * median(rows, 1),
+                "flexspine_tolerance": matched,
+                "flexspine_error": my_error(matched),
+                "flexspine_ms": 1e3 * median(rows, 0),
+                "ratio": ratio(rows, 1, 0),
+                "ratio_at_default_tolerance": ratio(rows, 1, 2),
+            }
+        )
+    return {"rows": rows_out}
+
+
+def field_benchmark() -> dict[str, float]:
+    """The derived field against one simplified by hand: double stance, 0.05 s, no events."""
+    model = load_model("kamimura2015-flexible")
+    start = np.array(scipy_peer.START)
+    toes = (0.4, -0.1)
+    by_hand = hy.taylor_adaptive(
+        hand_field.hand_field(), start.tolist(), pars=hand_field.hand_values(toes), tol=1e-12
+    )
+    bound = model.bind(1e-12)
+    mode = bound.mode("DS")
+    held = np.array([*toes, 1.0, 1.0])
+    with_events = mode.enter(0.0, np.append(start, 0.0), held)
+    derived = hy.taylor_adaptive(
+        with_events.sys, np.append(start, 0.0).tolist(), pars=with_events.pars.tolist(), tol=1e-12
+    )
+
+    def flow(integrator: object, state: np.ndarray) -> Callable[[], object]:
+        def work() -> None:
+            integrator.time = 0.0
+            integrator.state[:] = state
+            integrator.propagate_until(0.05)
+
+        return work
+
+    flow(by_hand, start)()
+    flow(derived, np.append(start, 0.0))()
+    difference = float(np.max(np.abs(by_hand.state - derived.state[:8])))
+    rows = in_turn((flow(by_hand, start), 2000), (flow(derived, np.append(start, 0.0)), 2000))
+    return {
+        "hand_terms": len(by_hand.decomposition) - 2 * 8,
+        "derived_terms": len(derived.decomposition) - 2 * 9,
+        "largest_difference": difference,
+        "hand_us": 1e6 * median(rows, 0),
+        "derived_us": 1e6 * median(rows, 1),
+        "cost_ratio": ratio(rows, 1, 0),
+    }
+
+
+def start_benchmark() -> dict[str, float]:
+    """Whole commands, warm, in seconds (median of five)."""
+    python = sys.executable
+    command = str(Path(python).with_name("flexspine"))
+    commands = {
+        "python -c pass": [python, "-c", "pass"],
+        "import flexspine": [python, "-c", "import flexspine"],
+        "flexspine --help": [command, "--help"],
+        "flexspine bound --json": [command, "bound", "--json"],
+    }
+
+    def wall(arguments: list[str]) -> float:
+        subprocess.run(arguments, capture_output=True, check=True)
+        times = [
+            seconds(lambda: subprocess.run(arguments, capture_output=True, check=True), 1)
+            for _ in range(5)
+        ]
+        return statistics.median(times)
+
+    return {name: wall(arguments) for name, arguments in commands.items()}
+
+
+def main() -> None:
+    console = Console()
+    strides = stride_benchmark()
+    table = Table(title="One stride with events (k_t = 260 N m/rad, 4.5 m/s), core call")
+    for heading in ("peer", "peer error", "peer ms", "flexspine error", "ms", "times faster"):
+        table.add_column(heading, justify="left" if heading == "peer" else "right")
+    for row in strides["rows"]:
+        table.add_row(
+            f"{row['peer']}, rtol {row['peer_tolerance']:g}",
+            f"{row['peer_error']:.1e}",
+            f"{row['peer_ms']:.2f}",
+            f"{row['flexspine_error']:.1e}",
+            f"{row['flexspine_ms']:.3f}",
+            f"{row['ratio']:.0f} ({row['ratio_at_default_tolerance']:.0f} at 1e-12)",
+        )
+    console.print(table)
+    field = field_benchmark()
+    console.print(
+        f"Derived field: {field['derived_terms']} terms, {field['derived_us']:.1f} us; by hand "
+        f"{field['hand_terms']} terms, {field['hand_us']:.1f} us; cost ratio "
+        f"{field['cost_ratio']:.2f} (0.05 s of double stance, results differ by "
+        f"{field['largest_difference']:.0e})"
+    )
+    starts = start_benchmark()
+    for name, wall in starts.items():
+        console.print(f"{name:<26}{wall:.2f} s")
+    out = Path("results/benchmarks.json")
+    out.parent.mkdir(exist_ok=True)
+    record = {"machine": platform.processor() or platform.machine(), "stride": strides}
+    out.write_text(json.dumps({**record, "field": field, "start": starts}, indent=2) + "\n")
+    console.print(f"written to {out}")
+
+
+if __name__ == "__main__":
+    main()
