@@ -1,0 +1,1 @@
+"""Speed as ratios against peers on the same work."""

@@ -244,7 +244,7 @@ class BoundMode:
         """Run the event kernel; the array returned is overwritten by the next call."""
         n = self._n_inputs_held
         self._inputs[:n] = held[:n]
-        self.code.kernel(states, outputs=self._answer, pars=self._inputs)
+        self.code.kernel(states, self._answer, self._inputs)
         return self._answer
 
     def evaluate_many(self, states: Array, held: Array) -> Array:

@@ -141,8 +141,9 @@ class _Run:
     def _advance(self, integrator: Any, limit: float) -> Any:
         if self.steps_left <= 0:
             return hy.taylor_outcome.step_limit
-        result, _, _, steps, _, _ = integrator.propagate_until(limit, max_steps=self.steps_left)
-        self._count(steps)
+        result, _, _, steps, _, _ = integrator.propagate_until(limit, self.steps_left)
+        self.steps += steps
+        self.steps_left -= steps
         return result
 
     def _advance_recording(self, integrator: Any, limit: float) -> Any:
@@ -154,17 +155,14 @@ class _Run:
                 result = hy.taylor_outcome.step_limit
                 break
             result, step = integrator.step(limit - integrator.time, write_tc=True)
-            self._count(1)
+            self.steps += 1
+            self.steps_left -= 1
             if step > 0:
                 times.append(integrator.time)
                 series.append(integrator.tc.copy())
         if series:
             self._keep(Arc(self.mode, self.held, np.array(times), np.array(series)))
         return result
-
-    def _count(self, steps: int) -> None:
-        self.steps += steps
-        self.steps_left -= steps
 
     def _keep(self, arc: Arc) -> None:
         """Keep an arc; if a guard touches zero within it without crossing, end the run there."""

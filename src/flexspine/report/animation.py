@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
+from PIL import Image
 
 from flexspine.errors import InputError, MachineError, OutputError, ParameterError
 from flexspine.report.figure import ending, heading
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 MAX_FRAMES = 600
 MAX_RATE = 100  # frames per second; a GIF counts time in hundredths of a second
 
+COLOR_SAMPLES = 10  # frames from which a GIF's 256 colours are taken
+
 MAX_POSTURES = 40
 PER_ROW = 5
 CELL = 1.9  # in, the width of one posture
@@ -63,14 +66,18 @@ def animate(
     """
     check_samples(dataset)
     path = Path(path)
+    if path.suffix.lower() not in (".gif", ".mp4"):
+        raise InputError(
+            f"cannot write an animation as '{path.name}'", "give a name that ends in .gif or .mp4"
+        )
     times = frame_times(dataset, fps, slow_down)
-    writer = _writer(path, fps)
     # Frames go to a file beside it, so that a failure leaves no half-written picture.
     part = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
     try:
         part.touch()
         with themed(_encoder()):
             scene = Scene(dataset, times, slow_down)
+            writer = _writer(part, fps, scene)
             with writer.saving(scene.figure, part, dpi=DOTS):
                 for number, posture in enumerate(scene.postures, start=1):
                     scene.show(posture)
@@ -107,15 +114,42 @@ def frame_times(dataset: xr.Dataset, fps: int, slow_down: float) -> Array:
     return np.clip(end - step * np.arange(count)[::-1], start, end)
 
 
-def _writer(path: Path, fps: int) -> AbstractMovieWriter:
-    suffix = path.suffix.lower()
-    if suffix == ".gif":
-        return PillowWriter(fps=fps)
-    if suffix == ".mp4":
+class GifWriter(PillowWriter):
+    """Puts every frame into the colours of some, at once: takes less time, memory and disk."""
+
+    def __init__(self, fps: int, some: list[Image.Image]) -> None:
+        super().__init__(fps=fps)
+        montage = Image.new("RGB", (some[0].width, some[0].height * len(some)))
+        for number, picture in enumerate(some):
+            montage.paste(picture, (0, number * picture.height))
+        self.colors = montage.quantize(256)
+        self.pictures: list[Image.Image] = []
+
+    def grab_frame(self, **_options: Any) -> None:
+        """Add the figure as it is now."""
+        picture = _picture(self.fig)
+        self.pictures.append(picture.quantize(palette=self.colors, dither=Image.Dither.NONE))
+
+    def finish(self) -> None:
+        """Write the file, played again and again."""
+        first, *others = self.pictures
+        duration = round(1000 / self.fps)  # ms
+        first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0)
+
+
+def _picture(figure: Any) -> Image.Image:
+    figure.canvas.draw()
+    return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+
+
+def _writer(path: Path, fps: int, scene: Scene) -> AbstractMovieWriter:
+    if path.suffix == ".mp4":
         return FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20"])
-    raise InputError(
-        f"cannot write an animation as '{path.name}'", "give a name that ends in .gif or .mp4"
-    )
+    some = []
+    for posture in scene.postures[:: max(1, len(scene.postures) // COLOR_SAMPLES)]:
+        scene.show(posture)
+        some.append(_picture(scene.figure))
+    return GifWriter(fps, some)
 
 
 def _encoder() -> dict[str, Any]:

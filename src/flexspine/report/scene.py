@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -40,6 +41,7 @@ from flexspine.report.timeline import (
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.backend_bases import RendererBase
     from matplotlib.text import Text
     from numpy.typing import NDArray
 
@@ -101,7 +103,7 @@ class Scene:
         self.limits = window(times)
         self.figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
         FigureCanvasAgg(self.figure)
-        self.figure.figimage(_backdrop(self, dataset, slow_down), zorder=-1)
+        self.figure.add_artist(_Backdrop(_draw_backdrop(self, dataset, slow_down)))
         self.axes = self._add_stage()
         points = 72 * STAGE[0] / (2 * self.view.aside)
         self.animal = StickFigure(self.axes, self.scale, points, self.postures[0])
@@ -143,7 +145,19 @@ class Scene:
         return axes
 
 
-def _backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArray[np.uint8]:
+class _Backdrop(Artist):
+    """A picture of the whole figure, put down as it is; `FigureImage` would resample it."""
+
+    def __init__(self, picture: NDArray[np.uint8]) -> None:
+        super().__init__()
+        self.picture = picture
+        self.set_zorder(-1)
+
+    def draw(self, renderer: RendererBase) -> None:
+        renderer.draw_image(renderer.new_gc(), 0, 0, self.picture)
+
+
+def _draw_backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArray[np.uint8]:
     figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
     axes = _stage(figure, scene.view)
     draw_ground(axes, scene.view)
@@ -165,7 +179,7 @@ def _backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArray[np
     write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), slowness, ha="right")
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
-    return np.array(canvas.buffer_rgba())
+    return np.array(canvas.buffer_rgba())[::-1]
 
 
 def _stage(figure: Figure, view: View) -> Axes:

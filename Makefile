@@ -1,0 +1,41 @@
+# make run: the main job.  make test: every check.  make bench: speed, as ratios.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= results
+
+.PHONY: run test bench pictures clean
+
+run: $(VENV)/.installed
+	$(BIN)/flexspine bound --strides 4 --out $(OUT)
+	@echo "Look at $(OUT)/figure.png, $(OUT)/strip.png and $(OUT)/animation.mp4"
+
+test: $(VENV)/.installed-dev
+	$(BIN)/ruff check src tests benchmarks
+	$(BIN)/ruff format --check src tests benchmarks
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest
+
+bench: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks
+
+# The pictures of the README.
+pictures: $(VENV)/.installed
+	$(BIN)/flexspine bound --strides 2 --out $(OUT)/pictures
+	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+$(VENV)/.installed: $(VENV)/bin/python pyproject.toml
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	touch $@ $(VENV)/.installed
+
+clean:
+	rm -rf $(VENV) results .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
