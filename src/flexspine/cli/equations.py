@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -51,12 +51,14 @@ def equations(
     kind = load_model(model).kind if known else find_kind(model)
     body = kind.body(True)
     lines = written_out(lagrangian(body, stance_legs(body, phase.value, damped=True)))
+    letters = _letters(kind)
     if json:
         print_json(
             {
                 "schema_version": SCHEMA_VERSION,
                 "model": kind.name,
                 "phase": phase.value,
+                "letters": letters,
                 "text": as_text(lines),
                 "latex": as_latex(lines),
             }
@@ -66,5 +68,29 @@ def equations(
     if format_ is not Format.latex:
         unicode = (sys.stdout.encoding or "").lower().startswith("utf")
         print(title, as_text(lines, unicode), sep="\n\n")
+        print("Letters:\n")
+        for letter, meaning in letters.items():
+            print(f"    {letter:<10}{meaning}")
+        print()
     if format_ is not Format.text:
         print(f"% {title}", as_latex(lines), sep="\n")
+
+
+def _letters(kind: Any) -> dict[str, str]:
+    """What the letters of a model stand for."""
+    from flexspine.models.bounder import FORE, HIND, HIP
+    from flexspine.parameters import quantities
+
+    about = {item.name: item for item in quantities(kind.parameters)}
+    letters = {
+        str(letter): f"{about[name].meaning} ({name}, {about[name].unit})"
+        for name, letter in kind.body(True).parameters.items()
+    }
+    letters |= {"x, y": "position of the CoM (m)"}
+    for angle, _ in kind.body(True).coordinates.values():
+        letters[str(angle)] = "pitch, nose up positive (rad); subscripts: f fore, h hind"
+    for leg in (FORE, HIND):
+        x, y = HIP[leg.side]
+        letters[f"{x}, {y}"] = f"position of the {leg.side} hip (m)"
+        letters[str(leg.toe)] = f"position of the {leg.side} toe (m)"
+    return letters

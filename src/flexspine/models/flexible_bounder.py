@@ -59,7 +59,7 @@ class FlexibleBounderParameters(ParameterSet):
 # Geometry
 
 F, F_RATE, H, H_RATE = sp.symbols("theta_f thetadot_f theta_h thetadot_h", real=True)
-BEND, BEND_RATE = sp.symbols("delta deltadot", real=True)
+BEND, BEND_RATE, TWIST = sp.symbols("delta deltadot epsilon", real=True)
 K_T, C_T, REST = sp.symbols("k_t c_t rho", real=True)
 M, MU = sp.symbols("m mu", real=True)  # whole and reduced mass
 
@@ -99,6 +99,7 @@ def _body(damped_spine: bool) -> Body:
         coupling: MU * fore.a * hind.a,
         BEND: F - H,
         BEND_RATE: F_RATE - H_RATE,
+        TWIST: BEND - REST,
     }
     joint = (
         X - lever_f * cos(F) + lever_h * cos(H),
@@ -110,7 +111,7 @@ def _body(damped_spine: bool) -> Body:
         "hind": (X - lever_f * cos(F) - reach_h * cos(H), Y - lever_f * sin(F) - reach_h * sin(H)),
     }
     # Energies. The two CoMs move against each other with velocity a_f f' + a_h h'.
-    torque = K_T * (BEND - REST)
+    torque = K_T * TWIST
     return Body(
         coordinates={"fore_pitch": (F, F_RATE), "hind_pitch": (H, H_RATE)},
         parameters={
@@ -129,7 +130,7 @@ def _body(damped_spine: bool) -> Body:
         + hind.A * H_RATE**2 / 2
         + coupling * cos(BEND) * F_RATE * H_RATE,
         gravity=M * GRAVITY * Y,
-        spine=K_T * (BEND - REST) ** 2 / 2,
+        spine=K_T * TWIST**2 / 2,
         power_lost=C_T * BEND_RATE**2 if damped_spine else sp.S.Zero,
         hips=hips,
         low_points={"spine joint": joint[1]},

@@ -123,6 +123,9 @@ class GifWriter(PillowWriter):
         for number, picture in enumerate(some):
             montage.paste(picture, (0, number * picture.height))
         self.colors = montage.quantize(256)
+        palette = np.reshape(self.colors.getpalette() or [255] * 3, (-1, 3))
+        palette[palette.sum(axis=1).argmax()] = 255  # paper stays white
+        self.colors.putpalette(palette.ravel().tolist())
         self.pictures: list[Image.Image] = []
 
     def grab_frame(self, **_options: Any) -> None:
@@ -174,10 +177,10 @@ def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
     rows = [shown[i : i + PER_ROW] for i in range(0, frames, PER_ROW)]
     width = max(len(rows[0]), 3) * CELL
     with themed():
-        figure = Figure(figsize=(0.75 + width, 0.9 + len(rows) * (height + LABELS)))
+        figure = Figure(figsize=(0.75 + width, 1.0 + len(rows) * (height + LABELS)))
         size = figure.get_size_inches()
         for number, row in enumerate(rows):
-            foot = size[1] - 0.5 - number * (height + LABELS) - height
+            foot = size[1] - 0.6 - number * (height + LABELS) - height
             axes = figure.add_axes(
                 (0.6 / size[0], foot / size[1], len(row) * CELL / size[0], height / size[1])
             )

@@ -120,7 +120,8 @@ def _joined(parts: list[str], limit: int = 100) -> list[str]:
     """Fill lines with whole parts."""
     lines: list[str] = []
     for part in parts:
-        if lines and len(lines[-1]) + len(part) + 3 <= limit:
+        plain = part.replace("$", "").replace("_", "")
+        if lines and len(lines[-1]) + len(plain) + 5 <= limit:
             lines[-1] += f"  ·  {part}"
         else:
             lines.append(part)
@@ -224,6 +225,7 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
             if name != "dissipated":
                 elastic.fill_between(time, shares[name], color=color, alpha=0.25, linewidth=0)
     elastic.set_ylim(bottom=0)
+    elastic.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     elastic.set_ylabel("enlarged, not\nstacked (%)")
     _add_legend(elastic)
 

@@ -175,8 +175,10 @@ def _draw_backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArr
     facts = describe(dataset)[0] + (f"  ·  {early}" if early else "")
     write(figure, (0.15, HEIGHT - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
     write(figure, (0.15, HEIGHT - 0.44), facts)
-    slowness = f"{slow_down:g} times slower than real"
-    write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), slowness, ha="right")
+    shown = scene.limits[1] - scene.limits[0]
+    part = "" if scene.limits[0] <= dataset["time"][0] else f"the last {shown:.3g} s, "
+    speed = part + tell_speed(slow_down)
+    write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), speed, ha="right")
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba())[::-1]
@@ -208,8 +210,10 @@ def draw_strokes(axes: Axes, reach: tuple[float, float], scale: Scale) -> None:
 
 
 def add_force_key(figure: Figure, place: Point, scale: Scale, metre: float) -> None:
-    """Draw an arrow of a round force at ``place``, where a metre is ``metre`` long (both in in)."""
-    force = round_down(scale.force)
+    """Draw an arrow of a round force at ``place`` (in); a metre is drawn ``metre`` in long."""
+    if not scale.force:
+        return
+    force = round_down(scale.force, (1, 2, 3, 4, 5, 6, 8))
     tip = np.array([metre * scale.arrow * force, 0.0])
     outline = arrow_outline(np.zeros(2), tip, metre * ARROW_WIDTH * scale.leg) + place
     corners = outline / figure.get_size_inches()
@@ -242,12 +246,19 @@ def tell_bend(bend: float) -> str:
     return f"spine {'sags' if degrees > 0 else 'arches'} by {abs(degrees):.1f}°"
 
 
+def tell_speed(slow_down: float) -> str:
+    """Return how fast the animation goes, in words."""
+    if slow_down == 1:
+        return "at real speed"
+    return f"{slow_down:g} times slower" if slow_down > 1 else f"{1 / slow_down:g} times faster"
+
+
 def pill(phase: str) -> dict[str, Any]:
     """Return the box around a phase's name."""
     return {"boxstyle": "round,pad=0.35", "facecolor": PHASE_COLORS[phase], "edgecolor": "none"}
 
 
-def round_down(value: float) -> float:
-    """Return the largest 1, 2 or 5 times a power of ten that is not above ``value``."""
+def round_down(value: float, steps: tuple[int, ...] = (1, 2, 5)) -> float:
+    """Return the largest of ``steps`` times a power of ten that is not above ``value``."""
     power = float(10.0 ** np.floor(np.log10(value)))
-    return max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)) * power
+    return max(step for step in steps if step * power <= value * (1 + 1e-9)) * power

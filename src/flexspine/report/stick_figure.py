@@ -50,16 +50,16 @@ class Scale:
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Scale:
-        """Return the scale of a run, with usable values where it has no force or no bend."""
+        """Return the scale of a run; its force is zero where no leg ever stood."""
         legs = [float(dataset[f"{side}_leg_length"].max()) for side in SIDES]
         force = max(float(dataset[f"{side}_grf"].max()) for side in SIDES)
         bend = float(abs(dataset["spine_angle"]).max()) if "spine_angle" in dataset else 0.0
-        return cls(max(legs), force if force > 0 else 1.0, max(bend, 1e-6))
+        return cls(max(legs), force, max(bend, 1e-6))
 
     @property
     def arrow(self) -> float:
         """Length of a force arrow, in m/N."""
-        return ARROW_LENGTH * self.leg / self.force
+        return ARROW_LENGTH * self.leg / self.force if self.force else 0.0
 
 
 class StickFigure:

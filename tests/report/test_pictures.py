@@ -1,0 +1,108 @@
+"""Pictures are made, say their units and simulate nothing. How they look is for eyes."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+from PIL import Image
+
+from flexspine import Model, animate, load_model, plot_run, simulate, strip, to_dataset
+from flexspine.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def data() -> xr.Dataset:
+    return to_dataset(simulate(load_model("kamimura2015-flexible"), strides=2))
+
+
+def test_every_axis_of_the_figure_has_a_unit(preset: Model) -> None:
+    figure = plot_run(to_dataset(simulate(preset)))
+    labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
+    labels += [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
+    assert len(labels) >= 5
+    for label in labels:
+        assert any(unit in label for unit in ("(m)", "(°)", "(N", "(%", "%)", "(s)")), label
+
+
+def test_the_figure_draws_the_data(data: xr.Dataset) -> None:
+    figure = plot_run(data)
+    lines = [line for axes in figure.axes for line in axes.get_lines()]
+
+    def drawn(values: np.ndarray) -> bool:
+        return any(
+            len(line.get_ydata()) == len(values) and np.allclose(line.get_ydata(), values)
+            for line in lines
+        )
+
+    assert drawn(data.com_y.values)
+    assert drawn(np.degrees(data.fore_pitch.values))
+    assert drawn(np.degrees(data.hind_pitch.values))
+
+
+def test_no_text_of_a_figure_runs_over_another(preset: Model) -> None:
+    figure = plot_run(to_dataset(simulate(preset, strides=3)))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    unseen = {
+        id(tick.label1)
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        for tick in axis.get_major_ticks()
+        if not min(axis.get_view_interval()) <= tick.get_loc() <= max(axis.get_view_interval())
+    }
+    texts = [
+        text
+        for text in figure.findobj(Text)
+        if text.get_visible() and text.get_text().strip() and id(text) not in unseen
+    ]
+    boxes = [(t.get_text(), t.get_window_extent(renderer)) for t in texts]
+    for (one, a), (two, b) in itertools.combinations(boxes, 2):
+        width = min(a.x1, b.x1) - max(a.x0, b.x0)
+        height = min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert not (width > 2 and height > 2), f"{one!r} runs over {two!r}"
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+def test_an_animation_has_frames_of_one_size(data: xr.Dataset, tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f"run{suffix}"
+    seen: list[float] = []
+    animate(data.isel(time=slice(0, 120)), file, progress=seen.append)
+    assert file.stat().st_size > 10_000
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1.0)
+    if suffix == ".gif":
+        with Image.open(file) as image:
+            assert image.n_frames >= 10
+
+
+def test_a_strip_is_drawn_for_every_preset(preset: Model, tmp_path: Path) -> None:
+    strip(to_dataset(simulate(preset))).savefig(tmp_path / "strip.png")
+    with Image.open(tmp_path / "strip.png") as image:
+        assert image.size[0] > 600
+
+
+def test_a_format_that_is_not_known_is_refused(data: xr.Dataset, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.avi"):
+        animate(data, tmp_path / "run.avi")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_without_samples_is_refused(data: xr.Dataset, tmp_path: Path) -> None:
+    empty = data.isel(time=slice(0, 0))
+    for draw in (plot_run, strip, lambda d: animate(d, tmp_path / "run.gif")):
+        with pytest.raises(InputError):
+            draw(empty)
+
+
+def test_drawing_leaves_the_data_alone(data: xr.Dataset) -> None:
+    before = data.copy(deep=True)
+    plot_run(data)
+    strip(data)
+    xr.testing.assert_identical(data, before)
