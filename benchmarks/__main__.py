@@ -77,9 +77,7 @@ def stride_benchmark() -> dict[str, object]:
     for name, (method, tolerance, field) in peers.items():
         error = peer_error(method, tolerance)
         # The loosest tolerance with which flexspine is at least as exact as the peer.
-        matched = next(
-            (t for t in TOLERANCES if my_error(t) <= error), TOLERANCES[-1]
-        )
+        matched = next((t for t in TOLERANCES if my_error(t) <= error), TOLERANCES[-1])
         rows = in_turn(
             (core(matched), 300),
             (lambda m=method, t=tolerance, f=field: scipy_peer.stride(m, t, f), 3),

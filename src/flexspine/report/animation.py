@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from flexspine.errors import InputError, MachineError, OutputError, ParameterError
-from flexspine.report.figure import ending, heading
+from flexspine.report.caption import ending, heading
 from flexspine.report.postures import Posture, postures
 from flexspine.report.scene import (
     DOTS,
@@ -216,6 +216,8 @@ def _write_heading(figure: Figure, dataset: xr.Dataset, shown: list[Posture]) ->
     write(figure, (0.12, height - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
     if early:
         write(figure, (0.12, height - 0.4), early)
+    if len(shown) == 1:
+        return
     moved = shown[-1].com[0] - shown[0].com[0]
     lasted = shown[-1].time - shown[0].time
     told = f"side by side; from first to last {moved:.3g} m in {lasted:.3g} s"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from itertools import zip_longest
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from flexspine.report.caption import SIDES, describe, ending, heading
 from flexspine.report.style import (
     ENERGY_COLORS,
     FAINT,
@@ -28,6 +28,7 @@ from flexspine.report.timeline import (
     Span,
     check_samples,
     draw_phase_bar,
+    events,
     label_phases,
     phase_spans,
     window,
@@ -39,8 +40,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-SIDES = ("fore", "hind")
 
 # More lines than this would hide the curves: only apexes are drawn, then none.
 MAX_EVENT_LINES = 80
@@ -81,70 +80,6 @@ def plot_run(dataset: xr.Dataset) -> Figure:
         figure.draw_without_rendering()
         label_phases(bar, spans, bar.get_position().width * width)
     return figure
-
-
-def describe(dataset: xr.Dataset) -> list[str]:
-    """Return what a reader must know about a run, in lines: parameters, energy, speed."""
-    given: dict[str, Any] = json.loads(dataset.attrs.get("parameters", "{}"))
-    parts = []
-    if "spine.stiffness" in given:
-        parts.append(f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad")
-        if given.get("spine.damping"):
-            parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
-    parts += _of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
-    if any(given.get(f"{side}.leg.damping") for side in SIDES):
-        parts += _of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
-    angles = json.loads(dataset.attrs.get("touchdown_angles", "{}"))
-    if angles:
-        both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
-        parts.append(f"touchdown angles: {both}")
-    parts.append(f"energy at the start {float(dataset['total_energy'][0]):.4g} J")
-    duration = float(dataset["time"][-1] - dataset["time"][0])
-    if duration > 0:
-        moved = float(dataset["com_x"][-1] - dataset["com_x"][0])
-        parts.append(f"mean speed {moved / duration:#.3g} m/s")
-    origins = json.loads(dataset.attrs.get("provenance", "{}"))
-    changed = [name for name, origin in origins.items() if origin == "set by user"]
-    return _joined(parts) + ([f"changed from the preset: {_few(changed)}"] if changed else [])
-
-
-def _of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str]:
-    fore, hind = (given.get(f"{side}.leg.{name}") for side in SIDES)
-    if fore is None or hind is None:
-        return []
-    value = f"= {fore:g}" if fore == hind else f"= {fore:g} (fore), {hind:g} (hind)"
-    return [f"leg {what} {value} {unit}"]
-
-
-def _joined(parts: list[str], limit: int = 100) -> list[str]:
-    """Fill lines with whole parts."""
-    lines: list[str] = []
-    for part in parts:
-        plain = part.replace("$", "").replace("_", "")
-        if lines and len(lines[-1]) + len(plain) + 5 <= limit:
-            lines[-1] += f"  ·  {part}"
-        else:
-            lines.append(part)
-    return lines
-
-
-def _few(names: list[str], most: int = 4) -> str:
-    more = [f"{len(names) - most} more"] if len(names) > most else []
-    return ", ".join(names[:most] + more)
-
-
-def heading(dataset: xr.Dataset) -> str:
-    """Return the name of what ran."""
-    attrs = dataset.attrs
-    return f"{attrs.get('preset', 'run')}: {attrs.get('model', 'bounder').replace('-', ' ')}"
-
-
-def ending(dataset: xr.Dataset) -> str | None:
-    """Return how a run ended early, or None if it completed."""
-    outcome = dataset.attrs.get("outcome", "completed")
-    if outcome == "completed":
-        return None
-    return f"{outcome.replace('_', ' ')}: {dataset.attrs.get('message', '')}"
 
 
 def _add_title(figure: Figure, dataset: xr.Dataset, details: list[str], height: float) -> None:
@@ -250,8 +185,7 @@ def _shares(dataset: xr.Dataset) -> dict[str, Array]:
 
 def _event_lines(dataset: xr.Dataset) -> list[tuple[Any, str, Array]]:
     """Line style, name and times (s) of the events, without those too many to be told apart."""
-    times = dataset["event_time"].values
-    kinds = dataset["event_kind"].values.astype(str)
+    times, kinds = events(dataset)
     apex = np.array(["apex" in kind for kind in kinds], dtype=bool)
     contact = np.array(["touchdown" in k or "lift-off" in k for k in kinds], dtype=bool) & ~apex
     rest = ~apex & ~contact
@@ -265,7 +199,9 @@ def _draw_events(panels: list[Axes], dataset: xr.Dataset) -> None:
     for axes in panels:
         for style, _, times in _event_lines(dataset):
             for time in times:
-                axes.axvline(time, color=FAINT, linestyle=style, linewidth=0.6, zorder=1.5)
+                axes.axvline(
+                    time, color=FAINT, linestyle=style, linewidth=0.6, zorder=1.5, clip_on=False
+                )
 
 
 def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:

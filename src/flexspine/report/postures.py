@@ -119,6 +119,7 @@ def _legs(
     for begin, end, swing in _swings(dataset, side, stances):
         now = ~stands & (times >= begin) & (times <= end)
         toes[now] = hips[now] + _swinging(swing, times[now], hips[now, 1])
+    toes[:, 1] = toes[:, 1].clip(min=0.0)  # not below the ground by a rounding error either
     forces = np.column_stack([_at(dataset, f"{side}_grf_{axis}", times) for axis in "xy"])
     forces[~stands] = 0.0
     return [

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MultipleLocator
 
-from flexspine.report.figure import describe, ending, heading
+from flexspine.report.caption import describe, ending, heading
 from flexspine.report.postures import Point, Posture, postures
 from flexspine.report.stick_figure import (
     ARROW_LENGTH,

@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-BLACK = "#000000"
 ORANGE = "#E69F00"
 SKY = "#56B4E9"
 GREEN = "#009E73"
 BLUE = "#0072B2"
 VERMILION = "#D55E00"
-PURPLE = "#CC79A7"
 
 INK = "#1A1A1A"
 FAINT = "#9A9A9A"
@@ -34,8 +32,8 @@ ENERGY_COLORS = {
     "dissipated": "#4D4D4D",
 }
 
-# Arched, straight, sagging: told apart by lightness at the ends and hue in between.
-BEND_COLORS = (GREEN, "#F2F2F2", "#A6407C")
+# Arched, straight, sagging: one end is warm and light, the other cold and dark.
+BEND_COLORS = (ORANGE, "#F4F4F4", "#5E3C99")
 
 TEXT_SIZE = 9.0  # pt
 SMALL_SIZE = 8.0  # pt

@@ -40,7 +40,7 @@ def check_samples(dataset: xr.Dataset) -> None:
         message = dataset.attrs.get("message")
         raise InputError(
             f"the run has no samples{f' ({message})' if message else ''}",
-            "start it from a state that lasts for some time",
+            "look at its outcome and change the start or the options",
         )
     for name in ("com_x", "com_y", "phase", "event_time"):
         if name not in dataset:
@@ -51,12 +51,12 @@ def phase_spans(dataset: xr.Dataset) -> list[Span]:
     """Return the phases in order; they meet at the times of the events between the samples."""
     time = dataset["time"].values
     phase = dataset["phase"].values.astype(str)
-    events = np.sort(dataset["event_time"].values)
+    met = np.sort(dataset["event_time"].values)
     firsts = [0, *(np.flatnonzero(phase[1:] != phase[:-1]) + 1)]
     starts = [float(time[0])]
     for first in firsts[1:]:
         # A sample at the very instant of an event belongs to what follows.
-        between = events[(events > time[first - 1]) & (events <= time[first])]
+        between = met[(met > time[first - 1]) & (met <= time[first])]
         starts.append(float(between[0] if len(between) else time[first]))
     return [
         Span(start, end, str(phase[first]), int(first), int(following) - 1)
@@ -66,16 +66,22 @@ def phase_spans(dataset: xr.Dataset) -> list[Span]:
     ]
 
 
+def events(dataset: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
+    """Return the times (s) and kinds of the events between the first and the last sample."""
+    time, times = dataset["time"].values, dataset["event_time"].values
+    inside = (times >= time[0]) & (times <= time[-1])
+    return times[inside], dataset["event_kind"].values.astype(str)[inside]
+
+
 def apex_times(dataset: xr.Dataset) -> NDArray[np.float64]:
     """Return the times (s) of the apexes, the start included if the run began at one."""
     time = dataset["time"].values
-    kinds = dataset["event_kind"].values.astype(str)
-    apex = np.array(["apex" in kind for kind in kinds], dtype=bool)
-    times = dataset["event_time"].values[apex]
+    times, kinds = events(dataset)
+    times = times[np.array(["apex" in kind for kind in kinds], dtype=bool)]
     climbing = float(dataset["com_y_rate"].values[0])
     if str(dataset["phase"].values[0]) == "DF" and abs(climbing) < APEX_TOLERANCE:
         times = np.append(time[0], times)
-    return np.unique(times[(times >= time[0]) & (times <= time[-1])])
+    return np.unique(times)
 
 
 def last_cycle(dataset: xr.Dataset) -> tuple[float, float]:
