@@ -6,6 +6,7 @@ from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 from subprocess import CalledProcessError
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from flexspine.report.scene import (
     pill,
     write,
 )
-from flexspine.report.stick_figure import Scale, StickFigure
+from flexspine.report.stick_figure import Scale, StickFigure, bend_palette
 from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
 from flexspine.report.timeline import check_samples, last_cycle
 
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+
+Color = tuple[int, int, int]
 
 # Twenty-four seconds at the usual rate: enough of any run.
 MAX_FRAMES = 600
@@ -75,7 +78,7 @@ def animate(
     part = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
     try:
         part.touch()
-        with themed(_encoder()):
+        with themed(_encoder() if path.suffix.lower() == ".mp4" else None):
             scene = Scene(dataset, times, slow_down)
             writer = _writer(part, fps, scene)
             with writer.saving(scene.figure, part, dpi=DOTS):
@@ -115,16 +118,17 @@ def frame_times(dataset: xr.Dataset, fps: int, slow_down: float) -> Array:
 
 
 class GifWriter(PillowWriter):
-    """Puts every frame into the colours of some, at once: takes less time, memory and disk."""
+    """Puts every frame into the colours of some and those ``kept``: saves time, memory, disk."""
 
-    def __init__(self, fps: int, some: list[Image.Image]) -> None:
+    def __init__(self, fps: int, some: list[Image.Image], kept: list[Color]) -> None:
         super().__init__(fps=fps)
         montage = Image.new("RGB", (some[0].width, some[0].height * len(some)))
         for number, picture in enumerate(some):
             montage.paste(picture, (0, number * picture.height))
-        self.colors = montage.quantize(256)
-        palette = np.reshape(self.colors.getpalette() or [255] * 3, (-1, 3))
-        palette[palette.sum(axis=1).argmax()] = 255  # paper stays white
+        found = montage.quantize(256 - len(kept)).getpalette() or [255] * 3
+        palette = np.vstack([np.reshape(found, (-1, 3))[: 256 - len(kept)], kept])
+        palette[(palette > 246).all(axis=1)] = 255  # paper stays white
+        self.colors = Image.new("P", (1, 1))
         self.colors.putpalette(palette.ravel().tolist())
         self.pictures: list[Image.Image] = []
 
@@ -152,13 +156,16 @@ def _writer(path: Path, fps: int, scene: Scene) -> AbstractMovieWriter:
     for posture in scene.postures[:: max(1, len(scene.postures) // COLOR_SAMPLES)]:
         scene.show(posture)
         some.append(_picture(scene.figure))
-    return GifWriter(fps, some)
+    return GifWriter(fps, some, bend_palette(32))
 
 
 def _encoder() -> dict[str, Any]:
     import imageio_ffmpeg
 
-    return {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
+    try:
+        return {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
+    except RuntimeError as error:
+        raise MachineError("no video encoder was found", "write a .gif instead") from error
 
 
 def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
@@ -215,7 +222,7 @@ def _write_heading(figure: Figure, dataset: xr.Dataset, shown: list[Posture]) ->
     early = ending(dataset)
     write(figure, (0.12, height - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
     if early:
-        write(figure, (0.12, height - 0.4), early)
+        write(figure, (0.12, height - 0.4), shorten(early, 90))
     if len(shown) == 1:
         return
     moved = shown[-1].com[0] - shown[0].com[0]

@@ -196,12 +196,12 @@ def _event_lines(dataset: xr.Dataset) -> list[tuple[Any, str, Array]]:
 
 
 def _draw_events(panels: list[Axes], dataset: xr.Dataset) -> None:
+    # Unclipped, since many a run ends with an event.
+    look: dict[str, Any] = {"color": FAINT, "linewidth": 0.6, "zorder": 1.5, "clip_on": False}
     for axes in panels:
         for style, _, times in _event_lines(dataset):
             for time in times:
-                axes.axvline(
-                    time, color=FAINT, linestyle=style, linewidth=0.6, zorder=1.5, clip_on=False
-                )
+                axes.axvline(time, linestyle=style, **look)
 
 
 def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:

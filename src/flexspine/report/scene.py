@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -171,10 +172,9 @@ def _draw_backdrop(scene: Scene, dataset: xr.Dataset, slow_down: float) -> NDArr
     draw_phase_bar(bar, spans, scene.limits)
     label_phases(bar, spans, STAGE[0])
     bar.set_xlabel("time (s)", labelpad=1)
-    early = ending(dataset)
-    facts = describe(dataset)[0] + (f"  ·  {early}" if early else "")
     write(figure, (0.15, HEIGHT - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
-    write(figure, (0.15, HEIGHT - 0.44), facts)
+    write(figure, (0.15, HEIGHT - 0.41), describe(dataset)[0])
+    write(figure, (0.15, HEIGHT - 0.57), shorten(ending(dataset) or "", 110))
     shown = scene.limits[1] - scene.limits[0]
     part = "" if scene.limits[0] <= dataset["time"][0] else f"the last {shown:.3g} s, "
     speed = part + tell_speed(slow_down)

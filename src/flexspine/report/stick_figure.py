@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 BODY_COLOR = "#5A5A5A"
-ARROW_COLOR = INK
 
 ZIGZAGS = 11  # corners of a leg's spring
 WAVES = 5  # of the spine's spring
@@ -118,7 +117,9 @@ class StickFigure:
         start = float(np.arctan2(fore[1], fore[0]))
         # Over the back from fore to hind, however the body is turned.
         turn = (float(np.arctan2(hind[1], hind[0])) - start) % (2 * np.pi)
-        curve = centre + wavy_arc(start, turn) * self.scale.leg
+        # On a body that is short for its legs the spring stays within the trunk.
+        size = min(self.scale.leg, 2.4 * float(min(np.hypot(*fore), np.hypot(*hind))))
+        curve = centre + wavy_arc(start, turn) * size
         for line in self.spring:
             line.set_data(*curve.T)
         self.spring[1].set_color(bend_color(bend, self.scale))
@@ -210,6 +211,12 @@ _BENDS = LinearSegmentedColormap.from_list("bend", BEND_COLORS)
 def bend_color(bend: float, scale: Scale) -> tuple[float, float, float, float]:
     """Colour of a bend (rad): arched, straight, sagging."""
     return _BENDS(0.5 + 0.5 * bend / scale.bend)
+
+
+def bend_palette(count: int) -> list[tuple[int, int, int]]:
+    """The colours of all bends in ``count`` steps of 0 to 255."""
+    levels = np.rint(255 * _BENDS(np.linspace(0, 1, count))[:, :3]).astype(int)
+    return [(red, green, blue) for red, green, blue in levels.tolist()]
 
 
 def _moved(point: Point, shift: float) -> Array:
