@@ -125,30 +125,29 @@ def two_floors(gap: float) -> Trajectory:
     return integrate(bound, start, end_time=1.0)
 
 
-def test_a_level_guard_fires_on_entry_and_a_crossing_guard_waits() -> None:
+@pytest.mark.parametrize("rising", [False, True])
+def test_a_level_guard_fires_on_entry_and_a_crossing_guard_waits(rising: bool) -> None:
+    """Falling x enters 'low' at x = 1, where the guard is at -1 already, falling or rising."""
     x, n = sp.symbols("x n", real=True)
+    expression = -x if rising else x - 2
 
-    def system(arming: Arming) -> HybridSystem:
-        """Falling x; entering 'low' at x = 1 finds the guard x - 2 already below zero."""
+    def visited(arming: Arming) -> tuple[str, ...]:
+        late = Guard("late", expression, "end", {n: n + 1}, arming)
         modes = {
             "high": Mode("high", {}, {x: sp.S(-1)}, (Guard("enter", x - 1, "low"),)),
-            "low": Mode(
-                "low", {}, {x: sp.S(-1)}, (Guard("late", x - 2, "end", {n: n + 1}, arming),)
-            ),
+            "low": Mode("low", {}, {x: sp.S(-1)}, (late,)),
             "end": Mode("end", {}, {x: sp.S(0)}, ()),
         }
-        return HybridSystem(
-            "ramp", (x,), (n,), (), tuple(modes), modes.__getitem__,
-            Section("none", {}, {}, {}, NEVER),
-        )  # fmt: skip
-
-    def modes(arming: Arming) -> tuple[str, ...]:
-        bound = BoundSystem(compile_system(system(arming), 1e-12), np.array([]))
+        section = Section("none", {}, {}, {}, NEVER)
+        system = HybridSystem("ramp", (x,), (n,), (), tuple(modes), modes.__getitem__, section)
+        bound = BoundSystem(compile_system(system, 1e-12), np.array([]))
         start = HybridState(0.0, "high", np.array([3.0]), np.zeros(1))
-        return integrate(bound, start, end_time=5.0).modes
+        run = integrate(bound, start, end_time=5.0)
+        assert run.outcome.completed
+        return run.modes
 
-    assert modes(Arming.LEVEL) == ("high", "end")
-    assert modes(Arming.CROSSING) == ("high", "low")
+    assert visited(Arming.LEVEL) == ("high", "end")
+    assert visited(Arming.CROSSING) == ("high", "low")
 
 
 def test_an_ending_guard_ends_the_run_with_its_outcome() -> None:
