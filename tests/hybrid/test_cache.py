@@ -17,9 +17,16 @@ print(simulate(load_model("slip")).apexes[-1]["height"])
 """
 
 
-def run_with(cache: Path) -> str:
+# Permissions do not bind the superuser, unless it gives up the power to ignore them.
+_POWERS = "-dac_override,-dac_read_search"
+BOUND_BY_PERMISSIONS = (
+    ("setpriv", f"--bounding-set={_POWERS}", f"--inh-caps={_POWERS}") if os.geteuid() == 0 else ()
+)
+
+
+def run_with(cache: Path, *prefix: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [*prefix, sys.executable, "-c", PROGRAM],
         env={**os.environ, "FLEXSPINE_CACHE_DIR": str(cache)},
         capture_output=True,
         text=True,
@@ -76,11 +83,13 @@ def test_a_cache_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
 
 
 def test_a_read_only_cache_is_done_without(tmp_path: Path) -> None:
-    if os.geteuid() == 0:
-        pytest.skip("permissions do not bind the superuser")
-    tmp_path.chmod(0o500)
+    expected = run_with(tmp_path)
+    for path in (*tmp_path.iterdir(), tmp_path):
+        path.chmod(0o500 if path.is_dir() else 0o400)
     try:
-        run_with(tmp_path)
+        assert run_with(tmp_path, *BOUND_BY_PERMISSIONS) == expected
+        with pytest.raises(subprocess.CalledProcessError):
+            subprocess.run([*BOUND_BY_PERMISSIONS, "touch", tmp_path / "new"], check=True)
     finally:
         tmp_path.chmod(0o700)
 
