@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from pathlib import Path
 
 import heyoka as hy
 from platformdirs import user_cache_path
 
 DIRECTORY_VARIABLE = "FLEXSPINE_CACHE_DIR"
+
+_STORE_FILES = "cache.db*"
+
+# A store that is locked or read-only is another matter: it is done without, never deleted.
+_SIGNS_OF_CORRUPTION = ("corrupt", "malformed", "not a database")
 
 _opened: list[Path] = []
 
@@ -36,34 +40,39 @@ def open_cache() -> None:
     hy.llvm_state.set_diskcache_path(directory)
     hy.llvm_state.set_diskcache_enabled(True)
     mend_cache()
-    if not _usable():
+    if _fault():
         hy.llvm_state.set_diskcache_enabled(False)
 
 
 def mend_cache() -> None:
     """Delete a corrupt store, so that the next compilation rebuilds it."""
-    directory = cache_directory()
-    if directory.exists() and not _usable():
-        _delete(directory)
+    fault = _fault()
+    if any(sign in fault for sign in _SIGNS_OF_CORRUPTION):
+        _delete_store()
 
 
 def clear_cache() -> tuple[Path, int]:
     """Delete all compiled code; returns the directory and the bytes freed."""
-    directory = cache_directory()
-    size = sum(file.stat().st_size for file in directory.glob("*")) if directory.is_dir() else 0
-    _delete(directory)
+    freed = _delete_store()
     _opened.clear()
-    return directory, size
+    return cache_directory(), freed
 
 
-def _usable() -> bool:
+def _fault() -> str:
+    """What heyoka says about the store; nothing if it can be used."""
     try:
         hy.llvm_state.get_diskcache_size()
-    except RuntimeError:
-        return False
-    return True
+    except RuntimeError as fault:
+        return str(fault)
+    return ""
 
 
-def _delete(directory: Path) -> None:
-    with contextlib.suppress(OSError):
-        shutil.rmtree(directory)
+def _delete_store() -> int:
+    """Delete heyoka's own files and nothing else; returns the bytes freed."""
+    freed = 0
+    for file in cache_directory().glob(_STORE_FILES):
+        with contextlib.suppress(OSError):
+            size = file.stat().st_size
+            file.unlink()
+            freed += size
+    return freed

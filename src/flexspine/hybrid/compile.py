@@ -66,7 +66,13 @@ class CompiledMode:
     """
 
     def __init__(
-        self, mode: Mode, integrator: Any, coefficients: Any, kernel: Any, jumps: tuple[Jump, ...]
+        self,
+        mode: Mode,
+        integrator: Any,
+        coefficients: Any,
+        kernel: Any,
+        jumps: tuple[Jump, ...],
+        section: str,
     ) -> None:
         self.mode = mode
         self.integrator = integrator
@@ -74,15 +80,11 @@ class CompiledMode:
         self.kernel = kernel
         self.jumps = jumps
         self.guards = slice(0, 2 * len(jumps))
-        self.due_at_start = _due(mode, mode)
+        self.section = next((jump for jump in jumps if jump.guard.name == section), None)
+        self.due_here = _due(mode, mode)
         self.state: Array = integrator.state
         self.numbers: Array = integrator.pars
         self.owner: BoundMode | None = None
-
-    @property
-    def terms(self) -> int:
-        """Elementary operations per Taylor order in the field, guards included."""
-        return int(len(self.integrator.decomposition) - 2 * self.integrator.dim)
 
 
 class CompiledSystem:
@@ -130,7 +132,7 @@ class CompiledSystem:
         integrator = hy.taylor_adaptive(field, start, tol=self.tolerance, t_events=events)
         kernel, jumps = self._event_kernel(mode)
         coefficients = self._coefficients(lower.coefficients)
-        return CompiledMode(mode, integrator, coefficients, kernel, jumps)
+        return CompiledMode(mode, integrator, coefficients, kernel, jumps, system.section.guard)
 
     def _coefficients(self, expressions: list[sp.Expr]) -> Any:
         """Compile the folded expressions as a function of the parameters."""

@@ -28,7 +28,10 @@ def touches_without_crossing(arc: Arc, mode: BoundMode) -> tuple[str, float] | N
         if not jump.guard.jumps:
             continue
         values, rates = table[jump.value], table[jump.rate]
-        turns = (rates[:-1] < 0) & (rates[1:] > 0) & (values[:-1] > 0) & (values[1:] > 0)
+        # A guard that is at zero when the arc begins has fired there or was let go there.
+        turns = (
+            (rates[:-1] < 0) & (rates[1:] > 0) & (values[:-1] > GRAZING_DEPTH) & (values[1:] > 0)
+        )
         for k in np.flatnonzero(turns):
             # The tangents at both ends bound a convex dip from below.
             step = times[k + 1] - times[k]

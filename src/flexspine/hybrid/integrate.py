@@ -27,8 +27,8 @@ SIMULTANEITY = 1e-12
 # Guard units; a guard above this is not due now at any rate below 1e6 per second.
 CLOSE = 1e-6
 
-# Guard units; a LEVEL guard this little below zero on entry is zero with rounding error.
-LEVEL_TOLERANCE = 1e-12
+# Guard units; a guard this close to zero is zero with rounding error.
+ZERO = 1e-12
 
 # Guard units per second; crossed more slowly, one rounding error of the guard (1e-16) moves the
 # event by more than SIMULTANEITY.
@@ -37,6 +37,9 @@ GRAZING_RATE = 1e-4
 # One guard firing this often within this many seconds is chatter; no gait comes near it.
 CHATTER_EVENTS = 8
 CHATTER_WINDOW = 1e-2
+
+# s; the slowest strides take one or two.
+SECTION_TIMEOUT = 10.0
 
 # A stride takes some 30 steps; spending this many between two crossings is getting nowhere.
 MAX_STEPS = 50_000
@@ -48,7 +51,7 @@ def integrate(
     *,
     end_time: float = inf,
     crossings: int | None = None,
-    section_timeout: float = 10.0,
+    section_timeout: float = SECTION_TIMEOUT,
     max_steps: int = MAX_STEPS,
     record: bool = False,
 ) -> Trajectory:
@@ -56,7 +59,8 @@ def integrate(
 
     With ``crossings``, a run that stays away from the section for ``section_timeout`` seconds
     ends as the section's ``missed`` outcome. ``max_steps`` bounds the Taylor steps between two
-    crossings. ``record`` keeps dense output. Always returns; the outcome tells how it ended.
+    crossings. ``record`` keeps dense output, and only then is a guard noticed that touches zero
+    without crossing it. Always returns; the outcome tells how it ended.
     """
     run = _Run(bound, start, end_time, crossings, section_timeout, max_steps, record)
     return run.go()
@@ -92,7 +96,7 @@ class _Run:
         self.outcome: Outcome | None = None
 
     def go(self) -> Trajectory:
-        self._settle_start()
+        self._start()
         while self.outcome is None:
             self._flow()
         return Trajectory(
@@ -154,10 +158,10 @@ class _Run:
             if self.steps_left <= 0:
                 result = hy.taylor_outcome.step_limit
                 break
-            result, step = integrator.step(limit - integrator.time, write_tc=True)
-            self.steps += 1
-            self.steps_left -= 1
-            if step > 0:
+            result, _ = integrator.step(limit - integrator.time, write_tc=True)
+            if integrator.time > times[-1]:
+                self.steps += 1
+                self.steps_left -= 1
                 times.append(integrator.time)
                 series.append(integrator.tc.copy())
         if series:
@@ -178,7 +182,8 @@ class _Run:
     def _stopped(self, result: Any, limit: float) -> Outcome:
         if result == hy.taylor_outcome.time_limit:
             if limit == self.end_time:
-                return Outcome(COMPLETED, f"reached t = {self.time:.6g} s")
+                self._settle()
+                return self.outcome or Outcome(COMPLETED, f"reached t = {self.time:.6g} s")
             return Outcome(
                 self.section.missed,
                 f"no {self.section.guard} within {self.section_timeout:g} s after "
@@ -193,9 +198,7 @@ class _Run:
         guard = jump.guard
         if self.time - self.instant <= SIMULTANEITY and guard.name in self.fired:
             return False  # the same root once more; the integrator now cools it down
-        crossed = guard.name == self.section.guard and all(
-            self.held[i] == value for i, value in self.bound.section_requires
-        )
+        crossed = guard.name == self.section.guard and self._may_cross()
         if not (crossed or jump.acts):
             return False
         self.instant, self.fired = self.time, [guard.name]
@@ -205,11 +208,26 @@ class _Run:
             if guard.ends is None and (kind := self._doubt(guard.name, values[jump.rate])):
                 self.outcome = Outcome(kind, f"{guard.name} at t = {self.time:.9g} s")
                 return True
+            crossed = crossed or self._section_is_due(mode, values)
             self._fire(jump, values)
         if crossed:
             self._cross()
         self.events.append(Event(tuple(self.fired), before, self._here()))
         return True
+
+    def _may_cross(self) -> bool:
+        return all(self.held[i] == value for i, value in self.bound.section_requires)
+
+    def _section_is_due(self, mode: BoundMode, values: Array) -> bool:
+        """Whether the section is crossed at the instant of another guard."""
+        jump = mode.code.section
+        if jump is None or jump.guard.name in self.fired or not self._may_cross():
+            return False
+        value, rate = values[jump.value], values[jump.rate]
+        due = rate < 0 and abs(value) <= -rate * SIMULTANEITY
+        if due:
+            self.fired.append(jump.guard.name)
+        return bool(due)
 
     def _fire(self, jump: Jump, values: Array) -> None:
         """Jump, then let every further guard that is due at this instant fire, each once."""
@@ -239,29 +257,35 @@ class _Run:
             rate = numbers[2 * index + 1]
             falls_now = rate < 0 and value <= -rate * SIMULTANEITY
             if by_level:
-                fires = falls_now or value < -LEVEL_TOLERANCE
+                fires = falls_now or value < -ZERO
             else:
                 fires = was_active and falls_now and value >= rate * SIMULTANEITY
             if fires and name not in self.fired:
                 return index
         return None
 
-    def _settle_start(self) -> None:
-        """Fire what is due at the very start, where every guard counts as armed."""
+    def _start(self) -> None:
+        """Refuse to start on a guard that is not crossed; fire what is due."""
         mode = self.bound.mode(self.mode)
-        values = mode.evaluate(self.states, self.held)
-        numbers = values[mode.code.guards].tolist()
+        numbers = mode.evaluate(self.states, self.held)[mode.code.guards].tolist()
         for jump in mode.code.jumps:
-            touching = -SIMULTANEITY <= numbers[jump.value] <= SIMULTANEITY
+            touching = -ZERO <= numbers[jump.value] <= ZERO
             if touching and jump.guard.jumps and abs(numbers[jump.rate]) < GRAZING_RATE:
                 self.outcome = Outcome(GRAZED, f"{jump.guard.name} at the start")
                 return
-        due = self._due(values[mode.code.guards], mode.code.due_at_start)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Fire what is due at the start or the end, where no root is looked for."""
+        mode = self.bound.mode(self.mode)
+        values = mode.evaluate(self.states, self.held)
+        due = self._due(values[mode.code.guards], mode.code.due_here)
         if due is not None:
             jump, before = mode.code.jumps[due], self.mode
-            self.fired = [jump.guard.name]
+            known = len(self.fired)
+            self.fired.append(jump.guard.name)
             self._fire(jump, values)
-            self.events.append(Event(tuple(self.fired), before, self._here()))
+            self.events.append(Event(tuple(self.fired[known:]), before, self._here()))
 
     def _doubt(self, name: str, rate: float) -> OutcomeKind | None:
         """Tell a grazing or a chattering event from a proper one."""
