@@ -23,6 +23,7 @@ bench: $(VENV)/.installed-dev
 # The pictures of the README.
 pictures: $(VENV)/.installed
 	$(BIN)/flexspine bound --strides 2 --out $(OUT)/pictures
+	mkdir -p docs/images
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
 
 $(VENV)/bin/python:

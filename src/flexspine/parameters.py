@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -97,6 +98,9 @@ def build(kind: type[P], flat: Mapping[str, Any]) -> P:
     """
     declared = {item.name: item for item in quantities(kind)}
     for name in flat:
+        members = [known for known in declared if known.startswith(f"{name}.")]
+        if members:
+            raise ParameterError(f"'{name}' is a group", f"set one of {', '.join(members)}")
         if name not in declared:
             raise UnknownNameError("parameter", name, declared)
     try:
@@ -133,6 +137,17 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value is a real number of any kind, NaN included, and no truth value."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def shortened(value: Any, most: int = 40) -> str:
+    """Return a value as an error message shows it: texts in quotes, nothing too long."""
+    shown = f"'{value}'" if isinstance(value, str) else str(value)
+    return shown if len(shown) <= most else f"{shown[:most]}..."
+
+
 def _quantity(name: str, field: FieldInfo) -> Quantity:
     bounds: dict[str, Any] = {}
     for rule in field.metadata:
@@ -157,12 +172,8 @@ def _explained(failure: ValidationError, declared: Mapping[str, Quantity]) -> Pa
     if fault["type"] == "missing":
         absent = name if name in declared else next(n for n in declared if n.startswith(name))
         return ParameterError(f"parameter '{absent}' has no value", f"give it, e.g. {absent}=...")
-    if name not in declared:
-        return ParameterError(f"'{name}' is a group of parameters", f"set e.g. {name}.NAME=VALUE")
     about = declared[name]
-    given = fault["input"]
-    shown = f"'{given}'" if isinstance(given, str) else f"{given}"
     return ParameterError(
-        f"parameter '{name}' = {shown} is not usable",
+        f"parameter '{name}' = {shortened(fault['input'])} is not usable",
         f"give a number in {about.bounds} {about.unit} ({about.meaning})",
     )

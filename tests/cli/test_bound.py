@@ -86,7 +86,7 @@ def test_a_fall_is_exit_code_1_with_advice(cli: Cli) -> None:
 
 
 def test_a_time_can_be_given_instead_of_strides(cli: Cli) -> None:
-    record = json.loads(cli("bound", "--seconds", "0.1", "--json").stdout)
+    record = json.loads(cli("bound", "--duration", "0.1", "--json").stdout)
     assert record["duration"] == 0.1
     assert record["period"] is None
 
@@ -130,8 +130,8 @@ BAD = {
     "unknown option": (["--strid", "3"], "--strid"),
     "no whole number": (["--strides", "two"], "--strides"),
     "no strides": (["--strides", "0"], "--strides"),
-    "both lengths": (["--strides", "2", "--seconds", "1"], "one of them"),
-    "negative time": (["--seconds", "-1"], "duration"),
+    "both lengths": (["--strides", "2", "--duration", "1"], "one of them"),
+    "negative time": (["--duration", "-1"], "duration"),
     "tolerance": (["--tolerance", "7"], "tolerance"),
 }
 

@@ -96,7 +96,7 @@ def test_a_full_disk_is_exit_code_3_and_keeps_older_results(
         raise OSError(28, "No space left on device", "trajectory.nc")
 
     monkeypatch.setattr(results, "_write_all", full)
-    assert app._run(["bound", "--out", str(kept.parent)]) == 3
+    assert app.run(["bound", "--out", str(kept.parent)]) == 3
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in kept.parent.iterdir()] == ["summary.json"]
     assert kept.read_text() == "older"

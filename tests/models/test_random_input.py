@@ -37,7 +37,7 @@ def sane(draw: st.DrawFn) -> tuple[str, dict[str, Any], dict[str, float], dict[s
             within(-15, 15) if name.endswith("_rate") else
             within(-0.6, 0.6)
         )
-        for name in model.apex_names
+        for name in model.apex
     }  # fmt: skip
     touchdown = {side: draw(within(-1.2, 1.2)) for side in ("fore", "hind")}
     return preset, changes, apex, touchdown
@@ -100,7 +100,7 @@ def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) 
     )
     names = [about.name for about in quantities(type(model.parameters))]
     changes = data.draw(st.dictionaries(st.sampled_from(names), number, max_size=3))
-    apex = data.draw(st.dictionaries(st.sampled_from(model.apex_names), st.floats(), max_size=3))
+    apex = data.draw(st.dictionaries(st.sampled_from(list(model.apex)), st.floats(), max_size=3))
     angles = data.draw(st.dictionaries(st.sampled_from(("fore", "hind")), st.floats(), max_size=2))
     check(model.name, changes, apex, angles)
 
@@ -120,6 +120,6 @@ def test_any_state_and_contact_ends_in_an_outcome(
     try:
         run = simulate(model, state={"com_y": 0.4, **state}, toes=toes, max_steps=3000)
     except InputError as refused:
-        assert "ground" in refused.message
+        assert "ground" in refused.message or "lift-off" in refused.message
         return
     assert run.outcome.name in OUTCOMES

@@ -6,15 +6,15 @@ Exit codes: 0 done, 1 the run ended without its goal, 2 bad input, 3 the machine
 
 from __future__ import annotations
 
-import errno
 import sys
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 
 from flexspine._version import __version__
 from flexspine.cli import bound, cache, equations, presets
 from flexspine.cli.output import fail
+from flexspine.cli.results import OUT_OF_SPACE
 from flexspine.errors import FlexspineError, InputError, MachineError
 
 INTERRUPTED = 130
@@ -54,12 +54,8 @@ def _common(
         typer.echo(context.get_help())
 
 
-def main() -> NoReturn:
-    """Run the command line and leave with its exit code."""
-    sys.exit(_run(sys.argv[1:]))
-
-
-def _run(arguments: list[str]) -> int:
+def run(arguments: list[str]) -> int:
+    """Run one command and return its exit code."""
     as_json = "--json" in arguments
     try:
         code = app(arguments, standalone_mode=False)
@@ -73,6 +69,8 @@ def _run(arguments: list[str]) -> int:
         code = INTERRUPTED
     except OSError as failure:
         return fail(_disk(failure), as_json)
+    except SystemExit:
+        code = 0  # the reader of our output went away; Typer leaves like this then
     if code == INTERRUPTED:
         print("flexspine: interrupted", file=sys.stderr)
     return code if isinstance(code, int) else 0
@@ -86,6 +84,6 @@ def _usage(failure: Any) -> InputError:
 
 def _disk(failure: OSError) -> MachineError:
     where = f" '{failure.filename}'" if failure.filename else ""
-    full = failure.errno in (errno.ENOSPC, errno.EDQUOT)
+    full = failure.errno in OUT_OF_SPACE
     remedy = "free some space and run it again" if full else "look at the disk and run it again"
     return MachineError(f"cannot use{where} ({failure.strerror or failure})", remedy)

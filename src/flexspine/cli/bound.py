@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
@@ -23,15 +24,18 @@ def bound(
     touchdown: Touchdown = None,
     strides: Annotated[
         int | None,
-        typer.Option(min=1, help="How many strides to run (1 unless --seconds is given)."),
+        typer.Option(min=1, help="How many strides to run (1 unless --duration is given)."),
     ] = None,
-    seconds: Annotated[
+    duration: Annotated[
         float | None, typer.Option(help="Run this many seconds instead of counting strides.")
     ] = None,
-    tolerance: Annotated[float, typer.Option(help="Tolerance of the integrator.")] = 1e-12,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Tolerance of the integrator (default 1e-12).")
+    ] = None,
     interval: Annotated[
-        float, typer.Option(help="Seconds between samples in the written data.")
-    ] = 1e-3,
+        float | None,
+        typer.Option(help="Seconds between samples in the written data (default 0.001)."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write data, figures and animations into this directory.")
     ] = None,
@@ -43,7 +47,7 @@ def bound(
     """Simulate bounding from an apex.
 
     Units are SI and radians. Exit code 0: all strides done; 1: the run ended otherwise, for
-    example by a fall; 2: bad input; 3: the machine failed.
+    example by a fall; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine bound --strides 3 --out results
@@ -52,9 +56,13 @@ def bound(
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.gaits.record import run_record
+    from flexspine.models.dataset import DEFAULT_INTERVAL, check_interval
     from flexspine.models.presets import load_model
-    from flexspine.models.simulation import simulate
+    from flexspine.models.simulation import DEFAULT_TOLERANCE, simulate
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    step = DEFAULT_INTERVAL if interval is None else interval
+    check_interval(step)
     model = load_model(
         preset,
         assignments("--set", set_),
@@ -65,10 +73,15 @@ def bound(
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         progress.begin("simulating")
-        run = simulate(model, strides=strides, duration=seconds, tolerance=tolerance)
+        run = simulate(
+            model,
+            strides=strides,
+            duration=duration,
+            tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
+        )
         record = run_record(run)
         if directory is not None:
-            directory.write(run, record, interval, animation, progress)
+            directory.write(run, record, step, animation, progress)
     if json:
         print_json(record)
     else:

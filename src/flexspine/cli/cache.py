@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import typer
 
+from flexspine._version import SCHEMA_VERSION
 from flexspine.cli.options import Json
-from flexspine.cli.output import SCHEMA_VERSION, print_json
+from flexspine.cli.output import print_json
 
 app = typer.Typer(help="Compiled code kept between starts.", no_args_is_help=True)
 

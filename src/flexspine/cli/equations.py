@@ -8,8 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from flexspine._version import SCHEMA_VERSION
 from flexspine.cli.options import Json
-from flexspine.cli.output import SCHEMA_VERSION, print_json
+from flexspine.cli.output import print_json
 
 
 class Format(StrEnum):
@@ -42,13 +43,16 @@ def equations(
 
         flexspine equations rigid-bounder --phase FS --format latex
     """
+    from flexspine.errors import UnknownNameError
     from flexspine.mechanics.equations import as_latex, as_text, written_out
     from flexspine.models.bounder import lagrangian, stance_legs
     from flexspine.models.presets import load_model, preset_names
-    from flexspine.models.registry import KINDS, find_kind
+    from flexspine.models.registry import KINDS
 
-    known = model not in KINDS and (model in preset_names() or model.endswith(".toml"))
-    kind = load_model(model).kind if known else find_kind(model)
+    try:
+        kind = KINDS[model] if model in KINDS else load_model(model).kind
+    except UnknownNameError:
+        raise UnknownNameError("model or preset", model, [*KINDS, *preset_names()]) from None
     body = kind.body(True)
     lines = written_out(lagrangian(body, stance_legs(body, phase.value, damped=True)))
     letters = _letters(kind)
@@ -88,7 +92,7 @@ def _letters(kind: Any) -> dict[str, str]:
     }
     letters |= {"x, y": "position of the CoM (m)"}
     for angle, _ in kind.body(True).coordinates.values():
-        letters[str(angle)] = "pitch, nose up positive (rad); subscripts: f fore, h hind"
+        letters[str(angle)] = "pitch, nose up positive (rad)"
     for leg in (FORE, HIND):
         x, y = HIP[leg.side]
         letters[f"{x}, {y}"] = f"position of the {leg.side} hip (m)"

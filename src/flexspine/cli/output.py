@@ -11,9 +11,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from flexspine._version import SCHEMA_VERSION
 from flexspine.errors import FlexspineError
-
-SCHEMA_VERSION = 1
 
 
 def print_json(record: dict[str, Any]) -> None:
@@ -33,7 +32,7 @@ def fail(failure: FlexspineError, as_json: bool) -> int:
             }
         )
     else:
-        print(f"flexspine: {failure.message}; {failure.remedy}", file=sys.stderr)
+        print("flexspine:", " ".join(str(failure).split()), file=sys.stderr)
     return failure.exit_code
 
 

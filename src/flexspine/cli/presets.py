@@ -6,8 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from flexspine._version import SCHEMA_VERSION
 from flexspine.cli.options import Json
-from flexspine.cli.output import SCHEMA_VERSION, print_json
+from flexspine.cli.output import print_json
 
 
 def presets(

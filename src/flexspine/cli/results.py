@@ -13,7 +13,10 @@ from flexspine.cli.output import Steps
 from flexspine.errors import OutputError
 from flexspine.models.simulation import Run
 
-_OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
+
+ANIMATIONS = ("animation.mp4", "animation.gif")
+PICTURES = ("figure.png", "strip.png", *ANIMATIONS)
 
 
 class ResultDirectory:
@@ -32,7 +35,7 @@ class ResultDirectory:
                 pass
         except OSError as failure:
             self._remove_new()
-            if failure.errno in _OUT_OF_SPACE:
+            if failure.errno in OUT_OF_SPACE:
                 raise
             raise OutputError(
                 f"cannot write to '{path}' ({failure.strerror})", "give --out another directory"
@@ -45,8 +48,12 @@ class ResultDirectory:
         stage = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.path))
         try:
             _write_all(stage, run, record, interval, animation, progress)
-            for file in sorted(stage.iterdir()):
+            made = sorted(stage.iterdir())
+            for file in made:
                 file.replace(self.path / file.name)
+            # A picture of an earlier run would pass for one of this run.
+            for name in {*PICTURES} - {file.name for file in made}:
+                (self.path / name).unlink(missing_ok=True)
         finally:
             shutil.rmtree(stage, ignore_errors=True)
 
@@ -91,6 +98,6 @@ def _write_all(
     plot_run(dataset).savefig(stage / "figure.png")
     strip(dataset).savefig(stage / "strip.png")
     if animation:
-        for suffix in (".mp4", ".gif"):
-            progress.begin(f"animating {suffix}")
-            animate(dataset, stage / f"animation{suffix}", progress=progress.at)
+        for name in ANIMATIONS:
+            progress.begin(f"drawing {name}")
+            animate(dataset, stage / name, progress=progress.at)

@@ -10,14 +10,19 @@ from numpy.polynomial import chebyshev
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.trajectory import Arc, HybridState
 from flexspine.models.dataset import sample, sample_times
+from flexspine.models.legs import SIDES, STANCE_PHASES
 from flexspine.models.simulation import Run
 from flexspine.parameters import values
-
-SIDES = ("fore", "hind")
 
 # Forces are analytic within a step of the integrator and vary little there: this degree
 # represents them to rounding error.
 _DEGREE = 12
+
+# Of the unit interval; a root this far off the real line is no turning point.
+_REAL = 1e-9
+
+# s; shorter runs than this are sampled at their ends.
+_SHORTEST_INTERVAL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -83,11 +88,10 @@ def _last_stride(run: Run) -> tuple[HybridState, HybridState] | None:
 
 
 def _stance_time(run: Run, side: str, start: HybridState, end: HybridState) -> float:
-    phases = ("FS", "DS") if side == "fore" else ("HS", "DS")
     return sum(
         min(arc.end, end.time) - max(arc.start, start.time)
         for arc in run.trajectory.arcs
-        if arc.mode in phases and arc.end > start.time and arc.start < end.time
+        if arc.mode in STANCE_PHASES[side] and arc.end > start.time and arc.start < end.time
     )
 
 
@@ -118,14 +122,14 @@ def _polished(nodes: Array, samples: Array, sign: float) -> float:
     """The largest value of ``sign`` times the interpolant of the samples."""
     series = chebyshev.chebfit(nodes, sign * samples, _DEGREE)
     turns = chebyshev.chebroots(chebyshev.chebder(series))
-    inside = turns.real[(np.abs(turns.imag) < 1e-9) & (np.abs(turns.real) <= 1)]
+    inside = turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)]
     return float(max([*chebyshev.chebval(inside, series), *(sign * samples)]))
 
 
 def _energy(run: Run) -> dict[str, float | None]:
     if not run.trajectory.arcs:
         return {"initial": None, "relative_drift": None}
-    interval = max(run.trajectory.duration / 1000, 1e-9)
+    interval = max(run.trajectory.duration / 1000, _SHORTEST_INTERVAL)
     table = sample(run, sample_times(run, interval))
     balance = table["total_energy"] + table["dissipated_energy"]
     initial = float(balance[0])

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
+from flexspine._version import SCHEMA_VERSION
 from flexspine.gaits.measures import summarize
+from flexspine.models.legs import SIDES
 from flexspine.models.simulation import Run
-
-SCHEMA_VERSION = 1
 
 
 def run_record(run: Run) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def run_record(run: Run) -> dict[str, Any]:
         "mean_speed": summary.mean_speed,
         "peak_grf": summary.peak_grf,
         "peak_grf_vertical": summary.peak_grf_vertical,
-        "duty_factor": summary.duty_factor or dict.fromkeys(("fore", "hind")),
+        "duty_factor": summary.duty_factor or dict.fromkeys(SIDES),
         "stride_length": summary.stride_length,
         "stride_frequency": summary.stride_frequency,
         "froude": summary.froude,

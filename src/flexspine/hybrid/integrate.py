@@ -279,6 +279,8 @@ class _Run:
         """Fire what is due at the start or the end, where no root is looked for."""
         mode = self.bound.mode(self.mode)
         values = mode.evaluate(self.states, self.held)
+        if self.time - self.instant > SIMULTANEITY:
+            self.instant, self.fired = self.time, []
         due = self._due(values[mode.code.guards], mode.code.due_here)
         if due is not None:
             jump, before = mode.code.jumps[due], self.mode

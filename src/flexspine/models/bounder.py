@@ -10,14 +10,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import sympy as sp
 
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Section
 from flexspine.mechanics.lagrangian import Definitions, Lagrangian
-from flexspine.models.legs import LegSymbols, StanceLeg, SwingLeg, hip_velocity
-from flexspine.parameters import ParameterSet, values
+from flexspine.models.legs import (
+    PHASES,
+    SIDES,
+    STANCE_PHASES,
+    LegSymbols,
+    StanceLeg,
+    SwingLeg,
+    hip_velocity,
+    phase_of,
+)
+from flexspine.parameters import ParameterSet, quantity, values
 
 FELL = OutcomeKind(
     "fell",
@@ -25,13 +35,17 @@ FELL = OutcomeKind(
 )
 NO_APEX = OutcomeKind(
     "no_apex",
-    "the animal never took off again; give it more energy or steeper touchdown angles",
+    "the animal stays on the ground, or flies for very long; change the energy of the start or "
+    "the touchdown angles",
 )
-
-PHASES = ("DF", "FS", "HS", "DS")
 
 X, Y, X_RATE, Y_RATE, DISSIPATED, GRAVITY = sp.symbols("x y xdot ydot E_d g", real=True)
 FORE, HIND = LegSymbols.of("fore"), LegSymbols.of("hind")
+
+
+def gravity_field() -> Any:
+    """The parameter that every model has."""
+    return quantity("m/s^2", "gravitational acceleration", above=0, upper=100, default=9.81)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +70,7 @@ class Body:
     observables: Mapping[str, sp.Expr] = field(default_factory=dict)
 
 
-HIP = {side: sp.symbols(f"X_{side[0]} Y_{side[0]}", real=True) for side in ("fore", "hind")}
+HIP = {side: sp.symbols(f"X_{side[0]} Y_{side[0]}", real=True) for side in SIDES}
 
 
 @dataclass(frozen=True)
@@ -104,8 +118,8 @@ def stance_legs(body: Body, phase: str, damped: bool) -> tuple[StanceLeg, ...]:
     bare = lagrangian(body)
     return tuple(
         StanceLeg(leg, HIP[leg.side], hip_velocity(bare, HIP[leg.side]), damped)
-        for leg, phases in ((FORE, ("FS", "DS")), (HIND, ("HS", "DS")))
-        if phase in phases
+        for leg in (FORE, HIND)
+        if phase in STANCE_PHASES[leg.side]
     )
 
 
@@ -158,8 +172,8 @@ def _mode(body: Body, phase: str, damped: bool) -> Mode:
     rates = dict(zip(mechanics.coordinates, mechanics.rates, strict=True))
     rates |= dict(zip(mechanics.rates, accelerations, strict=True))
     rates[DISSIPATED] = body.power_lost + sp.Add(*(leg.power_lost for leg in stance))
-    guards = [leg.touchdown(_phase(standing | {leg.leg.side})) for leg in swing]
-    guards += [leg.liftoff(_phase(standing - {leg.leg.side}), DISSIPATED) for leg in stance]
+    guards = [leg.touchdown(phase_of(standing | {leg.leg.side})) for leg in swing]
+    guards += [leg.liftoff(phase_of(standing - {leg.leg.side}), DISSIPATED) for leg in stance]
     if not stance:
         guards.append(Guard("apex", Y_RATE))
     # The CoM lies between the hips and the low points, so it is never the first to touch.
@@ -185,7 +199,3 @@ def _observables(body: Body, legs: tuple[StanceLeg | SwingLeg, ...]) -> dict[str
         "gravity_energy": body.gravity,
         "spine_energy": body.spine,
     }
-
-
-def _phase(standing: set[str]) -> str:
-    return {(): "DF", ("fore",): "FS", ("hind",): "HS"}.get(tuple(sorted(standing)), "DS")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from flexspine._version import __version__
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
+from flexspine.models.legs import PHASES, SIDES
 from flexspine.models.simulation import Run
 from flexspine.parameters import values
 
@@ -46,7 +48,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "hind_pitch_rate": ("rad/s", "pitch rate of the hind segment"),
     **{
         f"{side}_{name}": (unit, text.format(side))
-        for side in ("fore", "hind")
+        for side in SIDES
         for name, (unit, text) in _SIDE_VARIABLES.items()
     },
     "spine_joint_x": ("m", "horizontal position of the spine joint"),
@@ -61,7 +63,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "dissipated_energy": ("J", "energy lost in dampers since the start"),
 }
 
-PHASE_CODES = {"DF": 0, "FS": 1, "HS": 2, "DS": 3}
+PHASE_CODES = {phase: code for code, phase in enumerate(PHASES)}
 
 
 def sample_times(run: Run, interval: float) -> Array:
@@ -69,16 +71,36 @@ def sample_times(run: Run, interval: float) -> Array:
 
     Raises `ParameterError` for an interval that is not usable.
     """
+    check_interval(interval)
     duration = run.trajectory.duration
-    if not (interval > 0 and duration / interval < MAX_SAMPLES):
+    if duration / interval >= MAX_SAMPLES:
         raise ParameterError(
-            f"interval = {interval} s is not usable for a run of {duration:.6g} s",
+            f"interval = {interval} s is too short for a run of {duration:.6g} s",
             f"give one that makes fewer than {MAX_SAMPLES} samples",
         )
     start, end = run.trajectory.start.time, run.trajectory.end.time
     steps = np.arange(int(duration / interval) + 1, dtype=float)
     grid: Array = start + interval * steps
     return grid if grid[-1] >= end else np.append(grid, end)
+
+
+def check_interval(interval: float) -> None:
+    """Raise `ParameterError` for a sampling interval (s) that no run can have."""
+    if not 0 < interval < inf:
+        raise ParameterError(
+            f"interval = {interval} is not usable", "give seconds above zero, such as 0.001"
+        )
+
+
+def _checked(run: Run, times: Array) -> Array:
+    """Sorted times, if all of them lie within the run."""
+    start, end = run.trajectory.start.time, run.trajectory.end.time
+    if not np.all((times >= start) & (times <= end)):
+        raise ParameterError(
+            f"times reach beyond the run, which lasts from {start:.6g} to {end:.6g} s",
+            "give times within it",
+        )
+    return np.sort(times)
 
 
 def sample(run: Run, times: Array) -> dict[str, Array]:
@@ -117,11 +139,11 @@ def to_dataset(
     """
     import xarray as xr
 
-    grid = sample_times(run, interval) if times is None else np.sort(np.asarray(times, float))
-    columns = sample(run, grid) if run.trajectory.arcs else {}
+    wanted = None if times is None else _checked(run, np.asarray(times, dtype=float).ravel())
+    grid = sample_times(run, interval) if wanted is None else wanted
+    columns = sample(run, grid) if run.trajectory.arcs and grid.size else {}
     if not columns:
-        grid = grid[:0]
-        columns = {"phase": np.zeros(0)}
+        grid, columns = grid[:0], {"phase": np.zeros(0)}
     labels = np.array(list(PHASE_CODES))[columns.pop("phase").astype(int)]
     data: dict[str, tuple[str, Array, dict[str, str]]] = {
         name: ("time", column, {"units": VARIABLES[name][0], "long_name": VARIABLES[name][1]})

@@ -12,7 +12,18 @@ from functools import lru_cache
 import sympy as sp
 from sympy import cos, sin
 
-from flexspine.models.bounder import FORE, GRAVITY, HIND, X_RATE, Y_RATE, Body, BounderKind, X, Y
+from flexspine.models.bounder import (
+    FORE,
+    GRAVITY,
+    HIND,
+    X_RATE,
+    Y_RATE,
+    Body,
+    BounderKind,
+    X,
+    Y,
+    gravity_field,
+)
 from flexspine.models.legs import Leg
 from flexspine.parameters import ParameterSet, quantity
 
@@ -51,9 +62,7 @@ class FlexibleBounderParameters(ParameterSet):
     fore: Segment
     hind: Segment
     spine: Spine
-    gravity: float = quantity(
-        "m/s^2", "gravitational acceleration", above=0, upper=100, default=9.81
-    )
+    gravity: float = gravity_field()
 
 
 # Geometry

@@ -7,6 +7,7 @@ Source: Kamimura et al. 2015, Artif Life Robotics 20:270-275; damping is an addi
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import sympy as sp
@@ -15,13 +16,28 @@ from flexspine.hybrid.system import Arming, Guard
 from flexspine.mechanics.lagrangian import AppliedForce, Lagrangian, time_derivative
 from flexspine.parameters import ParameterSet, quantity
 
+SIDES = ("fore", "hind")
+
+# Both legs in flight, fore stance, hind stance, both in stance.
+PHASES = ("DF", "FS", "HS", "DS")
+STANCE_PHASES = {"fore": ("FS", "DS"), "hind": ("HS", "DS")}
+
 Symbols = dict[str, sp.Symbol]
+
+
+def phase_of(standing: Collection[str]) -> str:
+    """Return the phase in which these legs stand."""
+    return next(
+        phase
+        for phase in PHASES
+        if all((phase in STANCE_PHASES[side]) == (side in standing) for side in SIDES)
+    )
 
 
 class Leg(ParameterSet):
     """One pair of legs that act together."""
 
-    stiffness: float = quantity("N/m", "leg stiffness, per pair of legs", above=0, upper=1e9)
+    stiffness: float = quantity("N/m", "leg stiffness, per pair of legs", at_least=1, upper=1e9)
     damping: float = quantity(
         "N s/m", "leg damping, per pair of legs", at_least=0, upper=1e6, default=0.0
     )
@@ -144,7 +160,9 @@ class SwingLeg:
     def touchdown(self, target: str) -> Guard:
         """The toe meets the ground when the hip falls through ``l0 cos(gamma)``.
 
-        Falling through it needs having been above it, which is all that arming asks for.
+        Falling through it needs having been above it, which is all that arming asks for. A leg
+        that lands while it lengthens would pull; it is released at the same instant, and still
+        counts as having stood.
         """
         leg, (x, y) = self.leg, self.hip
         return Guard(

@@ -10,10 +10,10 @@ from functools import lru_cache
 
 import sympy as sp
 
-from flexspine.models.bounder import FORE, GRAVITY, HIND, Body, BounderKind
+from flexspine.models.bounder import FORE, GRAVITY, HIND, Body, BounderKind, gravity_field
 from flexspine.models.flexible_bounder import FORE_HALF, HIND_HALF, MU, Segment
 from flexspine.models.rigid_bounder import H_F, H_H, INERTIA, M, rigid_body
-from flexspine.parameters import ParameterSet, quantity
+from flexspine.parameters import ParameterSet
 
 # Parameters
 
@@ -23,9 +23,7 @@ class LockedBounderParameters(ParameterSet):
 
     fore: Segment
     hind: Segment
-    gravity: float = quantity(
-        "m/s^2", "gravitational acceleration", above=0, upper=100, default=9.81
-    )
+    gravity: float = gravity_field()
 
 
 # Geometry: the segments' CoMs are a_f + a_h apart, the joint is b ahead of the whole CoM

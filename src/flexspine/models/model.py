@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, pi
+from math import pi
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ from flexspine.hybrid.compile import Array, BoundSystem, compile_system
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import BounderKind
-from flexspine.parameters import ParameterSet, replaced, values
+from flexspine.models.legs import SIDES, phase_of
+from flexspine.parameters import ParameterSet, replaced, shortened, values
 
-SIDES = ("fore", "hind")
+# SI; beyond this no start or angle means anything, and squares of it still fit a double.
+LARGEST_START = 1e6
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,10 @@ class Model:
                     f"touchdown angle '{side}' = {angle:g} rad is beyond the horizontal",
                     "give an angle from the vertical between -1.57 and 1.57 rad",
                 )
+        # Plain floats, whatever kind of number was given.
+        for name in ("apex", "touchdown"):
+            plain = {key: float(value) for key, value in getattr(self, name).items()}
+            object.__setattr__(self, name, plain)
 
     def with_values(
         self,
@@ -105,11 +112,6 @@ class Model:
         coordinates = ("com_x", "com_y", *self.kind.body(False).coordinates)
         return (*coordinates, *(f"{name}_rate" for name in coordinates), "dissipated_energy")
 
-    @property
-    def apex_names(self) -> tuple[str, ...]:
-        """Names of the section coordinates, in order."""
-        return tuple(self.system.section.coordinates)
-
     @cached_property
     def parameter_vector(self) -> Array:
         """Parameters and touchdown angles in the order of ``system.parameters``."""
@@ -140,19 +142,24 @@ class Model:
         _check_numbers("state", {**dict.fromkeys(self.state_names, 0.0), **start}, self.state_names)
         _check_numbers("toe", {**dict.fromkeys(SIDES, 0.0), **toes}, SIDES)
         states = np.array([float(start.get(name, 0.0)) for name in self.state_names])
-        phase = {(): "DF", ("fore",): "FS", ("hind",): "HS"}.get(tuple(sorted(toes)), "DS")
         held = np.array(
             [*(float(toes.get(s, states[0])) for s in SIDES), *(float(s in toes) for s in SIDES)]
         )
-        return HybridState(0.0, phase, states, held)
+        return HybridState(0.0, phase_of(toes), states, held)
 
 
-def _check_numbers(kind: str, given: Mapping[str, Any], known: Any) -> None:
+def _check_numbers(kind: str, given: Mapping[str, Any], known: Collection[str]) -> None:
     for name, value in given.items():
         if name not in known:
             raise UnknownNameError(kind, name, known)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-            raise ParameterError(f"{kind} '{name}' = {value} is not usable", "give a finite number")
+        # Comparisons with NaN are false.
+        if isinstance(value, bool) or not (
+            isinstance(value, Real) and abs(float(value)) <= LARGEST_START
+        ):
+            raise ParameterError(
+                f"{kind} '{name}' = {shortened(value)} is not usable",
+                f"give a number no larger than {LARGEST_START:g}",
+            )
     for name in known:
         if name not in given:
             raise ParameterError(f"{kind} '{name}' has no value", f"give it, e.g. {name}=...")

@@ -65,7 +65,7 @@ def _read(preset: str) -> str:
     if path.suffix != ".toml" and not path.exists():
         raise UnknownNameError("preset", preset, preset_names())
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as failure:
         raise PresetError(
             f"cannot read '{preset}' ({failure.strerror})", "give a readable TOML file"
@@ -86,7 +86,8 @@ def _parse(name: str, text: str) -> dict[str, Any]:
                 f"known: {', '.join(sorted(_TABLES | _TEXTS | _LISTS))}",
             )
         wanted = dict if key in _TABLES else str if key in _TEXTS else list
-        if not isinstance(value, wanted):
+        texts = not isinstance(value, list) or all(isinstance(item, str) for item in value)
+        if not (isinstance(value, wanted) and texts):
             kind = {dict: "a table", str: "a text", list: "a list of texts"}[wanted]
             raise PresetError(f"'{name}': '{key}' is not {kind}", f"make it {kind}")
     return content
@@ -140,6 +141,6 @@ def _based(title: str, name: str, content: Mapping[str, Any], users: tuple[str, 
 
 def _numbers(content: Mapping[str, Any], table: str) -> dict[str, float]:
     return {
-        key: float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+        key: float(value) if type(value) is int and abs(value) < 2**53 else value
         for key, value in content.get(table, {}).items()
     }

@@ -11,7 +11,18 @@ from functools import lru_cache
 import sympy as sp
 from sympy import cos, sin
 
-from flexspine.models.bounder import FORE, GRAVITY, HIND, X_RATE, Y_RATE, Body, BounderKind, X, Y
+from flexspine.models.bounder import (
+    FORE,
+    GRAVITY,
+    HIND,
+    X_RATE,
+    Y_RATE,
+    Body,
+    BounderKind,
+    X,
+    Y,
+    gravity_field,
+)
 from flexspine.models.legs import Leg
 from flexspine.parameters import ParameterSet, quantity
 
@@ -38,9 +49,7 @@ class RigidBounderParameters(ParameterSet):
     body: Trunk
     fore: End
     hind: End
-    gravity: float = quantity(
-        "m/s^2", "gravitational acceleration", above=0, upper=100, default=9.81
-    )
+    gravity: float = gravity_field()
 
 
 # Geometry and energies

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
+from numbers import Integral, Real
 
 from flexspine.errors import ParameterError, StateError
+from flexspine.hybrid.compile import BoundSystem
 from flexspine.hybrid.integrate import MAX_STEPS, integrate
 from flexspine.hybrid.outcome import Outcome
+from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
 from flexspine.models.model import Model
+from flexspine.parameters import shortened
 
 # Taylor truncation error per step; strides then repeat to some 1e-13.
 DEFAULT_TOLERANCE = 1e-12
+
+# Below the first, rounding exceeds the truncation; above the second, nothing said here holds.
+TOLERANCES = (1e-17, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -69,36 +76,61 @@ def simulate(
     """Simulate ``strides`` strides (default 1) or ``duration`` seconds.
 
     Starts at the model's apex, or at ``state`` by state name (absent ones zero) with the legs in
-    ``toes`` (toe position x in m) on the ground. ``tolerance`` is the integrator's, between 1e-16
+    ``toes`` (toe position x in m) on the ground. ``tolerance`` is the integrator's, between 1e-17
     and 1e-3; ``max_steps`` bounds the work of one stride. A run that falls or gets stuck is no
     error: look at ``outcome``. Raises `ParameterError` and `StateError`.
     """
     if strides is not None and duration is not None:
         raise ParameterError("both strides and duration are given", "give one of them")
-    if strides is not None and strides < 1:
-        raise ParameterError(f"strides = {strides} is not usable", "give a whole number from 1 on")
-    if duration is not None and not (isfinite(duration) and duration > 0):
-        raise ParameterError(f"duration = {duration} is not usable", "give seconds above zero")
-    if not 1e-16 <= tolerance <= 1e-3:
-        raise ParameterError(f"tolerance = {tolerance} is not usable", "give 1e-16 to 1e-3")
-    if max_steps < 1:
-        raise ParameterError(f"max_steps = {max_steps} is not usable", "give a number from 1 on")
+    if toes and state is None:
+        raise ParameterError("toes are given without a state", "give the state they belong to")
+    wanted = _count("strides", 1 if strides is None else strides)
+    end = inf if duration is None else _number("duration", duration, 0, inf)
     start = model.apex_state() if state is None else model.state(state, toes)
-    bound = model.bind(tolerance)
-    mode = bound.mode(start.mode)
-    guards = mode.evaluate(start.states, start.held)
-    for jump in mode.code.jumps:
-        if jump.guard.ends is not None and not guards[jump.value] > 0:
-            raise StateError(
-                f"the start has the {jump.guard.name} ({guards[jump.value]:.4g} m)",
-                "raise the apex height or lower the pitch",
-            )
+    bound = model.bind(_number("tolerance", tolerance, *TOLERANCES))
+    _refuse_impossible(bound, start)
     trajectory = integrate(
         bound,
         start,
-        end_time=inf if duration is None else duration,
-        crossings=(strides or 1) if duration is None else None,
-        max_steps=max_steps,
+        end_time=end,
+        crossings=wanted if duration is None else None,
+        max_steps=_count("max_steps", max_steps),
         record=True,
     )
     return Run(model, trajectory, tolerance)
+
+
+def _count(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise ParameterError(
+            f"{name} = {shortened(value)} is not usable", "give a whole number from 1 on"
+        )
+    return int(value)
+
+
+def _number(name: str, value: float, low: float, high: float) -> float:
+    """Check that low < value < high."""
+    if isinstance(value, bool) or not (isinstance(value, Real) and low < float(value) < high):
+        between = f"above {low:g}" + (f" and below {high:g}" if high < inf else "")
+        raise ParameterError(
+            f"{name} = {shortened(value)} is not usable", f"give a number {between}"
+        )
+    return float(value)
+
+
+def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:
+    """Raise `StateError` for a body in the ground, or a leg that would have to pull."""
+    mode = bound.mode(start.mode)
+    guards = mode.evaluate(start.states, start.held)
+    for jump in mode.code.jumps:
+        guard, value = jump.guard, guards[jump.value]
+        if guard.ends is not None and not value > 0:
+            raise StateError(
+                f"the start has the {guard.name} ({value:.4g} m)",
+                "raise the apex height or lower the pitch",
+            )
+        if guard.jumps and guard.arming is Arming.LEVEL and value < 0:
+            raise StateError(
+                f"the start is past the {guard.name}, the leg would pull",
+                "put its toe nearer to the hip, or leave it out of toes",
+            )

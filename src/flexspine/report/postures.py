@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from flexspine.models.legs import STANCE_PHASES
 from flexspine.report.timeline import Span, apex_times, phase_spans
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 SIDES = ("fore", "hind")
-STANCE_PHASES = {"fore": ("FS", "DS"), "hind": ("HS", "DS")}
 
 # The models' massless legs swing in no time, so how a swing is drawn is a matter of looks.
 SWING_FORWARD = 0.75  # share of the swing in which the leg turns to its touchdown angle
