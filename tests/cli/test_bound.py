@@ -133,6 +133,10 @@ BAD = {
     "both lengths": (["--strides", "2", "--duration", "1"], "one of them"),
     "negative time": (["--duration", "-1"], "duration"),
     "tolerance": (["--tolerance", "7"], "tolerance"),
+    "a group": (["--set", "spine=3"], "spine.stiffness"),
+    "a huge start": (["--apex", "speed=1e200"], "speed"),
+    "no interval": (["--interval", "inf"], "interval"),
+    "two lines": (["--preset", "a\nb.toml"], "a"),
 }
 
 
@@ -199,6 +203,31 @@ def test_an_interrupt_is_exit_code_130_and_leaves_nothing(tmp_path: Path) -> Non
     assert process.returncode == 130
     assert errors == "flexspine: interrupted\n"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.2, 0.3, 0.45, 0.6])
+def test_an_interrupt_while_starting_is_no_traceback(tmp_path: Path, delay: float) -> None:
+    command = Path(sys.executable).with_name("flexspine")
+    process = subprocess.Popen(
+        [command, "bound", "--strides", "60", "--out", "results"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors == "flexspine: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_of_an_earlier_run_do_not_stay(cli: Cli, tmp_path: Path) -> None:
+    assert cli("bound", "--out", "results").returncode == 0
+    assert (tmp_path / "results" / "animation.gif").exists()
+    assert cli("bound", "--out", "results", "--no-animation").returncode == 0
+    assert not (tmp_path / "results" / "animation.gif").exists()
 
 
 def test_a_reader_that_goes_away_brings_no_complaint(tmp_path: Path) -> None:

@@ -74,6 +74,30 @@ def test_a_corrupt_cache_is_rebuilt_silently(tmp_path: Path, damage: str) -> Non
     assert sum(files(tmp_path).values()) > 100_000, "rebuilt, not merely bypassed"
 
 
+def test_nothing_but_the_store_is_ever_deleted(tmp_path: Path) -> None:
+    from flexspine.hybrid.cache import clear_cache
+
+    run_with(tmp_path)
+    (tmp_path / "thesis.txt").write_text("precious")
+    (tmp_path / "cache.db").write_bytes(b"not a database at all" * 1000)
+    run_with(tmp_path)
+    assert (tmp_path / "thesis.txt").read_text() == "precious"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FLEXSPINE_CACHE_DIR", str(tmp_path))
+        clear_cache()
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_a_store_that_another_process_locks_is_left_to_it(tmp_path: Path) -> None:
+    expected = run_with(tmp_path)
+    compiled = entries(tmp_path)
+    with closing(sqlite3.connect(tmp_path / "cache.db", isolation_level=None)) as holder:
+        holder.execute("begin exclusive")
+        assert run_with(tmp_path) == expected
+        holder.execute("rollback")
+    assert entries(tmp_path) == compiled
+
+
 def test_a_cache_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a directory")

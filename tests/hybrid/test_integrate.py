@@ -211,3 +211,17 @@ def test_a_state_that_blows_up_is_an_outcome() -> None:
     run = integrate(bound, start, end_time=2.0)
     assert run.outcome.name in {"diverged", "timed_out"}
     assert run.end.time <= 1.0 + 1e-9
+
+
+def test_an_event_at_the_very_end_of_a_run_happens() -> None:
+    fall = math.sqrt(2 / 9.81)
+    run = drop(ball(), 1.0, 1.0, end_time=fall)
+    assert [event.names for event in run.events] == [("bounce",)]
+    assert run.end.states[1] > 0
+
+
+@pytest.mark.parametrize("record", [False, True])
+def test_steps_are_counted_alike_with_and_without_recording(record: bool) -> None:
+    run = drop(ball(), 1.0, 0.9, crossings=4, record=record)
+    assert run.steps == drop(ball(), 1.0, 0.9, crossings=4, record=not record).steps
+    assert all(arc.end > arc.start for arc in run.arcs)

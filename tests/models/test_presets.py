@@ -109,6 +109,10 @@ def test_a_value_set_by_the_user_says_so() -> None:
         ('base = "scout2"\n[touchdown]\nfore = 2', "beyond the horizontal"),
         ('model = "rigid-bounder"', "no value"),
         ("model = 3", "not a text"),
+        ('base = "scout2"\nnotes = [1, 2]', "not a list of texts"),
+        ('base = "scout2"\n[parameters]\nfore = 3', "'fore' is a group"),
+        ('base = "scout2"\n[touchdown]\nfore = ' + "9" * 400, "touchdown"),
+        ('base = "scout2"\n[parameters.body]\nmass = ' + "9" * 400, "body.mass"),
     ],
 )
 def test_a_malformed_file_is_refused_in_one_line(tmp_path: Path, content: str, told: str) -> None:
@@ -118,6 +122,12 @@ def test_a_malformed_file_is_refused_in_one_line(tmp_path: Path, content: str, t
         load_model(file)
     assert told in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+    file = tmp_path / "windows.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + b'base = "scout2"')
+    assert load_model(file).parameters == load_model("scout2").parameters
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import BounderKind
 from flexspine.models.legs import SIDES, phase_of
-from flexspine.parameters import ParameterSet, replaced, shortened, values
+from flexspine.parameters import ParameterSet, is_number, replaced, shortened, values
 
 # SI; beyond this no start or angle means anything, and squares of it still fit a double.
 LARGEST_START = 1e6
@@ -153,9 +152,7 @@ def _check_numbers(kind: str, given: Mapping[str, Any], known: Collection[str]) 
         if name not in known:
             raise UnknownNameError(kind, name, known)
         # Comparisons with NaN are false.
-        if isinstance(value, bool) or not (
-            isinstance(value, Real) and abs(float(value)) <= LARGEST_START
-        ):
+        if not (is_number(value) and -LARGEST_START <= value <= LARGEST_START):
             raise ParameterError(
                 f"{kind} '{name}' = {shortened(value)} is not usable",
                 f"give a number no larger than {LARGEST_START:g}",

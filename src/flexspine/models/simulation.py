@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from numbers import Integral, Real
+from numbers import Integral
 
 from flexspine.errors import ParameterError, StateError
 from flexspine.hybrid.compile import BoundSystem
@@ -14,7 +14,7 @@ from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
 from flexspine.models.model import Model
-from flexspine.parameters import shortened
+from flexspine.parameters import is_number, shortened
 
 # Taylor truncation error per step; strides then repeat to some 1e-13.
 DEFAULT_TOLERANCE = 1e-12
@@ -101,7 +101,7 @@ def simulate(
 
 
 def _count(name: str, value: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+    if not (is_number(value) and isinstance(value, Integral) and value >= 1):
         raise ParameterError(
             f"{name} = {shortened(value)} is not usable", "give a whole number from 1 on"
         )
@@ -110,7 +110,7 @@ def _count(name: str, value: int) -> int:
 
 def _number(name: str, value: float, low: float, high: float) -> float:
     """Check that low < value < high."""
-    if isinstance(value, bool) or not (isinstance(value, Real) and low < float(value) < high):
+    if not (is_number(value) and low < value < high):
         between = f"above {low:g}" + (f" and below {high:g}" if high < inf else "")
         raise ParameterError(
             f"{name} = {shortened(value)} is not usable", f"give a number {between}"
