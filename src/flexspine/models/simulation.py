@@ -9,7 +9,7 @@ from numbers import Integral
 
 from flexspine.errors import ParameterError, StateError
 from flexspine.hybrid.compile import BoundSystem
-from flexspine.hybrid.integrate import MAX_STEPS, integrate
+from flexspine.hybrid.integrate import MAX_STEPS, ZERO, integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
@@ -129,7 +129,7 @@ def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:
                 f"the start has the {guard.name} ({value:.4g} m)",
                 "raise the apex height or lower the pitch",
             )
-        if guard.jumps and guard.arming is Arming.LEVEL and value < 0:
+        if guard.jumps and guard.arming is Arming.LEVEL and value < -ZERO:
             raise StateError(
                 f"the start is past the {guard.name}, the leg would pull",
                 "put its toe nearer to the hip, or leave it out of toes",
