@@ -7,7 +7,7 @@
     │   ├── PresetError         a preset file that cannot be read
     │   ├── StateError          an initial state that cannot be simulated
     │   └── OutputError         a place that results cannot be written to
-    └── MachineError      the machine failed: disk, worker, missing extra   exit code 3
+    └── MachineError      the machine failed, such as a full disk   exit code 3
 
 A run that merely ends badly (it fell) raises nothing: that is an `Outcome`.
 """
@@ -78,7 +78,7 @@ class OutputError(InputError):
 
 
 class MachineError(FlexspineError):
-    """The machine failed: the disk is full, a worker died, an extra is missing."""
+    """The machine failed, such as a full disk."""
 
     code = "environment"
     exit_code = 3

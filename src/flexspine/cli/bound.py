@@ -66,8 +66,8 @@ def bound(
     model = load_model(
         preset,
         assignments("--set", set_),
-        apex=assignments("--apex", apex),  # type: ignore[arg-type]  # checked by the model
-        touchdown=assignments("--touchdown", touchdown),  # type: ignore[arg-type]
+        apex=assignments("--apex", apex),
+        touchdown=assignments("--touchdown", touchdown),
     )
     with ExitStack() as stack:
         progress = stack.enter_context(steps())

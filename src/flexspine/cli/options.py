@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -27,9 +27,9 @@ Touchdown = Annotated[
 ]
 
 
-def assignments(option: str, given: list[str] | None) -> dict[str, float | str]:
+def assignments(option: str, given: list[str] | None) -> dict[str, Any]:
     """Parse ``NAME=VALUE`` items; a value that is no number stays a text for others to refuse."""
-    parsed: dict[str, float | str] = {}
+    parsed: dict[str, Any] = {}
     for item in given or []:
         name, equals, value = item.partition("=")
         if not (name.strip() and equals and value.strip()):
