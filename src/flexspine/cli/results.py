@@ -7,11 +7,13 @@ import json
 import shutil
 import tempfile
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from flexspine.cli.output import Steps
 from flexspine.errors import OutputError
-from flexspine.models.simulation import Run
+
+if TYPE_CHECKING:
+    from flexspine.models.simulation import Run
 
 OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
 

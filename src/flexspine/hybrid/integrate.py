@@ -79,8 +79,7 @@ class _Run:
         max_steps: int,
         record: bool,
     ) -> None:
-        self.bound, self.start = bound, start
-        self.advance = self._advance_recording if record else self._advance
+        self.bound, self.start, self.record = bound, start, record
         self.end_time, self.wanted = end_time, wanted
         self.section_timeout, self.max_steps = section_timeout, max_steps
         self.section = bound.system.section
@@ -125,8 +124,9 @@ class _Run:
         integrator = mode.enter(self.time, self.states, self.held)
         code, limit = mode.code, self.limit
         jumps = code.jumps
+        advance = self._advance_recording if self.record else self._advance
         while True:
-            result = self.advance(integrator, limit)
+            result = advance(integrator, limit)
             if self.outcome is not None:
                 return
             if result == hy.taylor_outcome.err_nf_state:
@@ -182,7 +182,8 @@ class _Run:
     def _stopped(self, result: Any, limit: float) -> Outcome:
         if result == hy.taylor_outcome.time_limit:
             if limit == self.end_time:
-                self._settle()
+                mode = self.bound.mode(self.mode)
+                self._settle(mode, mode.evaluate(self.states, self.held))
                 return self.outcome or Outcome(COMPLETED, f"reached t = {self.time:.6g} s")
             return Outcome(
                 self.section.missed,
@@ -267,18 +268,17 @@ class _Run:
     def _start(self) -> None:
         """Refuse to start on a guard that is not crossed; fire what is due."""
         mode = self.bound.mode(self.mode)
-        numbers = mode.evaluate(self.states, self.held)[mode.code.guards].tolist()
+        values = mode.evaluate(self.states, self.held)
+        numbers = values[mode.code.guards].tolist()
         for jump in mode.code.jumps:
             touching = -ZERO <= numbers[jump.value] <= ZERO
             if touching and jump.guard.jumps and abs(numbers[jump.rate]) < GRAZING_RATE:
                 self.outcome = Outcome(GRAZED, f"{jump.guard.name} at the start")
                 return
-        self._settle()
+        self._settle(mode, values)
 
-    def _settle(self) -> None:
+    def _settle(self, mode: BoundMode, values: Array) -> None:
         """Fire what is due at the start or the end, where no root is looked for."""
-        mode = self.bound.mode(self.mode)
-        values = mode.evaluate(self.states, self.held)
         if self.time - self.instant > SIMULTANEITY:
             self.instant, self.fired = self.time, []
         due = self._due(values[mode.code.guards], mode.code.due_here)
