@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.models.bounder import BounderKind
 from flexspine.models.flexible_bounder import FlexibleBounderParameters
 from flexspine.models.presets import load_model
 from flexspine.models.registry import KINDS
@@ -17,8 +18,8 @@ PUBLISHED = load_model("kamimura2015-flexible").parameters
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
-def test_every_parameter_has_a_unit_a_meaning_and_finite_bounds(kind: object) -> None:
-    for about in quantities(kind.parameters):  # type: ignore[attr-defined]
+def test_every_parameter_has_a_unit_a_meaning_and_finite_bounds(kind: BounderKind) -> None:
+    for about in quantities(kind.parameters):
         assert about.unit
         assert about.meaning
         assert math.isfinite(about.lower)

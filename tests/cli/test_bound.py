@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -184,16 +183,26 @@ def test_a_wrong_interval_leaves_older_results_alone(cli: Cli, tmp_path: Path) -
     assert {path.name: path.read_bytes() for path in (tmp_path / "results").iterdir()} == before
 
 
-def test_an_interrupt_is_exit_code_130_and_leaves_nothing(tmp_path: Path) -> None:
-    command = Path(sys.executable).with_name("flexspine")
-    process = subprocess.Popen(
-        [command, "bound", "--strides", "40", "--out", "results"],
-        cwd=tmp_path,
-        env=os.environ,
+def begin_long_run(folder: Path) -> subprocess.Popen[str]:
+    """Start a run whose animations take a while."""
+    return subprocess.Popen(
+        [
+            Path(sys.executable).with_name("flexspine"),
+            "bound",
+            "--strides",
+            "60",
+            "--out",
+            "results",
+        ],
+        cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
+
+
+def test_an_interrupt_is_exit_code_130_and_leaves_nothing(tmp_path: Path) -> None:
+    process = begin_long_run(tmp_path)
     for _ in range(600):
         if list(tmp_path.glob("results/.partial-*/*.png")):
             break
@@ -207,14 +216,7 @@ def test_an_interrupt_is_exit_code_130_and_leaves_nothing(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("delay", [0.1, 0.2, 0.3, 0.45, 0.6])
 def test_an_interrupt_while_starting_is_no_traceback(tmp_path: Path, delay: float) -> None:
-    command = Path(sys.executable).with_name("flexspine")
-    process = subprocess.Popen(
-        [command, "bound", "--strides", "60", "--out", "results"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = begin_long_run(tmp_path)
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)

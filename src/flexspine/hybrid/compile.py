@@ -96,6 +96,7 @@ class CompiledSystem:
         self._modes: dict[str, CompiledMode] = {}
         self._observables: dict[str, Any] = {}
         self._states = {symbol: hy.make_vars(f"s{i}") for i, symbol in enumerate(system.states)}
+        self._variables = list(self._states.values())
         self._held = {symbol: hy.par[i] for i, symbol in enumerate(system.held)}
         first = len(system.held)
         self._raw = {symbol: hy.par[first + i] for i, symbol in enumerate(system.parameters)}
@@ -113,7 +114,9 @@ class CompiledSystem:
         if name not in self._observables:
             mode = self.system.mode(name)
             lower = self._plain(mode.definitions)
-            function = self._function([lower(expr) for expr in mode.observables.values()])
+            function = _function(
+                [lower(expr) for expr in mode.observables.values()], self._variables
+            )
             self._observables[name] = (tuple(mode.observables), function)
         names, function = self._observables[name]
         return names, function
@@ -167,17 +170,18 @@ class CompiledSystem:
                     due=_due(target, mode),
                 )
             )
-        return self._function(outputs), tuple(jumps)
+        return _function(outputs, self._variables), tuple(jumps)
 
     def _guards_and_rates(self, mode: Mode, at: Mapping[sp.Symbol, Any]) -> list[Any]:
         """Each guard's value and its rate along the field, at the given values of the variables."""
         lower = self._plain(mode.definitions)
-        here = list(self._states.values())
         field = [lower(mode.field[symbol]) for symbol in self._states]
         pairs: list[Any] = []
         for guard in mode.guards:
             value = lower(guard.expression)
-            slope = hy.sum([hy.diff(value, s) * f for s, f in zip(here, field, strict=True)])
+            slope = hy.sum(
+                [hy.diff(value, s) * f for s, f in zip(self._variables, field, strict=True)]
+            )
             pairs += [value, slope]
         moved = {v: at[s] for s, v in (self._states | self._held).items() if at[s] != v}
         return list(hy.subs(pairs, moved)) if moved else pairs
@@ -185,9 +189,6 @@ class CompiledSystem:
     def _plain(self, definitions: Mapping[sp.Symbol, sp.Expr]) -> Lowering:
         """A lowering that folds nothing; kernels are called too seldom to gain from it."""
         return Lowering({**self._states, **self._held, **self._raw}, (), definitions, 0)
-
-    def _function(self, outputs: list[Any]) -> Any:
-        return _function(outputs, list(self._states.values()))
 
 
 def _function(outputs: list[Any], variables: list[Any]) -> Any:

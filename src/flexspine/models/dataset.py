@@ -80,7 +80,7 @@ def sample_times(run: Run, interval: float) -> Array:
         )
     start, end = run.trajectory.start.time, run.trajectory.end.time
     steps = np.arange(int(duration / interval) + 1, dtype=float)
-    grid: Array = start + interval * steps
+    grid: Array = np.minimum(start + interval * steps, end)  # rounding may overshoot
     return grid if grid[-1] >= end else np.append(grid, end)
 
 
