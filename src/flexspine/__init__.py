@@ -11,7 +11,13 @@ from flexspine._version import __version__
 
 if TYPE_CHECKING:
     from flexspine.errors import FlexspineError, InputError, MachineError
+    from flexspine.gaits.continuation import Branch, trace_branch
+    from flexspine.gaits.gait import Gait, examine
+    from flexspine.gaits.landmarks import Landmark
     from flexspine.gaits.measures import summarize
+    from flexspine.gaits.search import Search, find_gaits
+    from flexspine.gaits.stability import Stability, floquet_multipliers
+    from flexspine.gaits.switching import switch_branch
     from flexspine.models.dataset import to_dataset
     from flexspine.models.model import Model
     from flexspine.models.presets import load_model, preset_names
@@ -20,36 +26,56 @@ if TYPE_CHECKING:
     from flexspine.report.figure import plot_run
 
 _HOMES = {
-    "MachineError": "errors",
+    "Branch": "gaits.continuation",
     "FlexspineError": "errors",
+    "Gait": "gaits.gait",
     "InputError": "errors",
+    "Landmark": "gaits.landmarks",
+    "MachineError": "errors",
     "Model": "models.model",
     "Run": "models.simulation",
+    "Search": "gaits.search",
+    "Stability": "gaits.stability",
     "animate": "report.animation",
+    "examine": "gaits.gait",
+    "find_gaits": "gaits.search",
+    "floquet_multipliers": "gaits.stability",
     "load_model": "models.presets",
     "plot_run": "report.figure",
     "preset_names": "models.presets",
     "simulate": "models.simulation",
     "strip": "report.animation",
     "summarize": "gaits.measures",
+    "switch_branch": "gaits.switching",
     "to_dataset": "models.dataset",
+    "trace_branch": "gaits.continuation",
 }
 
 __all__ = [
+    "Branch",
     "FlexspineError",
+    "Gait",
     "InputError",
+    "Landmark",
     "MachineError",
     "Model",
     "Run",
+    "Search",
+    "Stability",
     "__version__",
     "animate",
+    "examine",
+    "find_gaits",
+    "floquet_multipliers",
     "load_model",
     "plot_run",
     "preset_names",
     "simulate",
     "strip",
     "summarize",
+    "switch_branch",
     "to_dataset",
+    "trace_branch",
 ]
 
 

@@ -36,7 +36,7 @@ def ball(*extra: Guard) -> HybridSystem:
         parameters=(G, E),
         modes=("flight",),
         mode=lambda _: flight,
-        section=Section("apex", {BOUNCES: 1.0}, {BOUNCES: 0.0}, {"height": Y}, NEVER),
+        section=Section(("apex",), {BOUNCES: 1.0}, {BOUNCES: 0.0}, {"height": Y}, NEVER),
     )
 
 
@@ -118,7 +118,7 @@ def two_floors(gap: float) -> Trajectory:
 
     system = HybridSystem(
         "floors", (Y, V), (a, b), (G, E), ("none", "first", "second", "both"), mode,
-        Section("apex", {}, {}, {"height": Y}, NEVER),
+        Section(("apex",), {}, {}, {"height": Y}, NEVER),
     )  # fmt: skip
     bound = BoundSystem(compile_system(system, 1e-12), np.array([9.81, 1.0]))
     start = HybridState(0.0, "none", np.array([1.0, 0.0]), np.zeros(2))
@@ -138,7 +138,7 @@ def test_a_level_guard_fires_on_entry_and_a_crossing_guard_waits(rising: bool) -
             "low": Mode("low", {}, {x: sp.S(-1)}, (late,)),
             "end": Mode("end", {}, {x: sp.S(0)}, ()),
         }
-        section = Section("none", {}, {}, {}, NEVER)
+        section = Section(("none",), {}, {}, {}, NEVER)
         system = HybridSystem("ramp", (x,), (n,), (), tuple(modes), modes.__getitem__, section)
         bound = BoundSystem(compile_system(system, 1e-12), np.array([]))
         start = HybridState(0.0, "high", np.array([3.0]), np.zeros(1))
@@ -167,7 +167,7 @@ def rolling(clearance: float, record: bool = True) -> Trajectory:
     down = Mode("down", {}, {a: sp.S(0)}, ())
     system = HybridSystem(
         "wheel", (a,), (w,), (G, E), ("up", "down"), {"up": up, "down": down}.__getitem__,
-        Section("none", {}, {}, {}, NEVER),
+        Section(("none",), {}, {}, {}, NEVER),
     )  # fmt: skip
     bound = BoundSystem(compile_system(system, 1e-12), np.array([clearance, 0.0]))
     start = HybridState(0.0, "up", np.array([-2.0]), np.zeros(1))
@@ -204,7 +204,7 @@ def test_a_state_that_blows_up_is_an_outcome() -> None:
     x, n = sp.symbols("x n", real=True)
     mode = Mode("only", {}, {x: x**2}, ())
     system = HybridSystem(
-        "blow-up", (x,), (n,), (), ("only",), lambda _: mode, Section("none", {}, {}, {}, NEVER)
+        "blow-up", (x,), (n,), (), ("only",), lambda _: mode, Section(("none",), {}, {}, {}, NEVER)
     )
     bound = BoundSystem(compile_system(system, 1e-12), np.array([]))
     start = HybridState(0.0, "only", np.array([1.0]), np.zeros(1))

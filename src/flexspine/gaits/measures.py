@@ -18,6 +18,17 @@ from flexspine.parameters import values
 # represents them to rounding error.
 _DEGREE = 12
 
+# Chebyshev points of the second kind hold the ends of each step; from samples there to a series.
+_NODES = chebyshev.chebpts2(_DEGREE + 1)
+_INTERPOLATE = np.linalg.inv(chebyshev.chebvander(_NODES, _DEGREE))
+
+# From samples at those points to the mean: Clenshaw-Curtis quadrature.
+_MEAN = np.array([0.0 if k % 2 else 1 / (1 - k**2) for k in range(_DEGREE + 1)]) @ _INTERPOLATE
+
+# The slope of a Chebyshev series at 1; at -1 every other sign changes.
+_POWERS = np.arange(_DEGREE + 1)
+_SLOPES = _POWERS.astype(float) ** 2
+
 # Of the unit interval; a root this far off the real line is no turning point.
 _REAL = 1e-9
 
@@ -46,11 +57,12 @@ class Summary:
     energy: dict[str, float | None]
 
 
-def summarize(run: Run) -> Summary:
+def summarize(run: Run, profile: Profile | None = None) -> Summary:
     """Measure a run.
 
     ``froude`` is v^2 / (g l) with the mean speed of the stride and the mean rest length of the
     legs; ``relative_drift`` the largest change of total plus dissipated energy over the initial.
+    ``profile`` spares making that of the run anew.
     """
     trajectory = run.trajectory
     given = values(run.model.parameters)
@@ -63,9 +75,10 @@ def summarize(run: Run) -> Summary:
         leg = sum(given[f"{side}.leg.rest_length"] for side in SIDES) / 2
         froude = (length / period) ** 2 / (given["gravity"] * leg)
         duty = {side: _stance_time(run, side, *stride) / period for side in SIDES}
+    profile = profile or Profile(run)
     spine = None
     if "spine.stiffness" in given and trajectory.arcs:
-        low, high = _extremes(run, "spine_angle")
+        low, high = profile.range("spine_angle")
         spine = (low, high)
     return Summary(
         period=period,
@@ -75,8 +88,8 @@ def summarize(run: Run) -> Summary:
         froude=froude,
         distance=moved,
         mean_speed=moved / trajectory.duration if trajectory.duration > 0 else None,
-        peak_grf={side: _extremes(run, f"{side}_grf")[1] for side in SIDES},
-        peak_grf_vertical={side: _extremes(run, f"{side}_grf_y")[1] for side in SIDES},
+        peak_grf={side: profile.range(f"{side}_grf")[1] for side in SIDES},
+        peak_grf_vertical={side: profile.range(f"{side}_grf_y")[1] for side in SIDES},
         spine_range=spine,
         energy=_energy(run),
     )
@@ -95,35 +108,68 @@ def _stance_time(run: Run, side: str, start: HybridState, end: HybridState) -> f
     )
 
 
-def _extremes(run: Run, name: str) -> tuple[float, float]:
-    """Smallest and largest value of an observable over the run, to rounding error."""
-    pairs = [_arc_extremes(run, arc, name) for arc in run.trajectory.arcs]
-    if not pairs:
-        return 0.0, 0.0
-    return min(low for low, _ in pairs), max(high for _, high in pairs)
+class Profile:
+    """Ranges and means of observables and states over a recorded run, to rounding error."""
+
+    def __init__(self, run: Run) -> None:
+        self._steps = [np.diff(arc.times) for arc in run.trajectory.arcs]
+        self._tables = [_nodal(run, arc) for arc in run.trajectory.arcs]
+
+    def range(self, name: str) -> tuple[float, float]:
+        """Return smallest and largest value; zero for a run without length."""
+        pairs = [_range(table[name]) for table in self._tables if name in table]
+        if not pairs:
+            return 0.0, 0.0
+        return min(low for low, _ in pairs), max(high for _, high in pairs)
+
+    def mean(self, name: str) -> float:
+        """Return the mean over time, zero where there is no such quantity."""
+        duration = sum(float(steps.sum()) for steps in self._steps)
+        if not duration:
+            return 0.0
+        pairs = zip(self._steps, self._tables, strict=True)
+        parts = (steps @ table[name] @ _MEAN for steps, table in pairs if name in table)
+        return float(sum(parts)) / duration
+
+    def first(self, name: str) -> float:
+        """Return the value at the start."""
+        return float(self._tables[0][name][0, 0])
 
 
-def _arc_extremes(run: Run, arc: Arc, name: str) -> tuple[float, float]:
-    # Chebyshev points of the second kind hold the ends of each step.
-    nodes = chebyshev.chebpts2(_DEGREE + 1)
+def _nodal(run: Run, arc: Arc) -> dict[str, Array]:
+    """Every quantity at the Chebyshev points of each step of an arc, shape (steps, points)."""
     begin, step = arc.times[:-1], np.diff(arc.times)
-    times = (begin[:, None] + step[:, None] * (nodes + 1) / 2).ravel()
-    table = run.trajectory.observe(arc, arc(times))[name].reshape(len(step), -1)
-    low, high = float(table.min()), float(table.max())
-    spread = table.max(axis=1) - table.min(axis=1)
-    for row in np.flatnonzero((table.max(axis=1) > high - spread) & (spread > 0)):
-        high = max(high, _polished(nodes, table[row], 1.0))
-    for row in np.flatnonzero((table.min(axis=1) < low + spread) & (spread > 0)):
-        low = min(low, -_polished(nodes, table[row], -1.0))
+    times = (begin[:, None] + step[:, None] * (_NODES + 1) / 2).ravel()
+    states = arc(times)
+    table = dict(zip(run.model.state_names, states.T, strict=True))
+    table |= run.trajectory.observe(arc, states)
+    return {name: column.reshape(len(step), -1) for name, column in table.items()}
+
+
+def _range(table: Array) -> tuple[float, float]:
+    lows, highs = table.min(axis=1), table.max(axis=1)
+    low, high = float(lows.min()), float(highs.max())
+    spread = highs - lows
+    for row in np.flatnonzero((highs > high - spread) & (spread > 0)):
+        high = max(high, _polished(table[row], 1.0))
+    for row in np.flatnonzero((lows < low + spread) & (spread > 0)):
+        low = min(low, -_polished(table[row], -1.0))
     return low, high
 
 
-def _polished(nodes: Array, samples: Array, sign: float) -> float:
+def _polished(samples: Array, sign: float) -> float:
     """The largest value of ``sign`` times the interpolant of the samples."""
-    series = chebyshev.chebfit(nodes, sign * samples, _DEGREE)
+    series = _INTERPOLATE @ (sign * samples)
+    top = int(np.argmax(sign * samples))
+    largest = float(sign * samples[top])
+    if top in (0, _DEGREE):
+        # An end that is the largest sample, and not left upwards: the end it is.
+        outward = -1.0 if top == 0 else 1.0
+        if outward * (_SLOPES * outward ** (_POWERS + 1)) @ series >= 0:
+            return largest
     turns = chebyshev.chebroots(chebyshev.chebder(series))
     inside = turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)]
-    return float(max([*chebyshev.chebval(inside, series), *(sign * samples)]))
+    return float(max([*chebyshev.chebval(inside, series), largest]))
 
 
 def _energy(run: Run) -> dict[str, float | None]:

@@ -72,7 +72,6 @@ class CompiledMode:
         coefficients: Any,
         kernel: Any,
         jumps: tuple[Jump, ...],
-        section: str,
     ) -> None:
         self.mode = mode
         self.integrator = integrator
@@ -80,7 +79,7 @@ class CompiledMode:
         self.kernel = kernel
         self.jumps = jumps
         self.guards = slice(0, 2 * len(jumps))
-        self.section = next((jump for jump in jumps if jump.guard.name == section), None)
+        self.by_name = {jump.guard.name: jump for jump in jumps}
         self.due_here = _due(mode, mode)
         self.state: Array = integrator.state
         self.numbers: Array = integrator.pars
@@ -114,7 +113,7 @@ class CompiledSystem:
         if name not in self._observables:
             mode = self.system.mode(name)
             lower = self._plain(mode.definitions)
-            function = _function(
+            function = compile_expressions(
                 [lower(expr) for expr in mode.observables.values()], self._variables
             )
             self._observables[name] = (tuple(mode.observables), function)
@@ -134,14 +133,14 @@ class CompiledSystem:
         start = [0.0] * len(system.states)
         integrator = hy.taylor_adaptive(field, start, tol=self.tolerance, t_events=events)
         kernel, jumps = self._event_kernel(mode)
-        coefficients = self._coefficients(lower.coefficients)
-        return CompiledMode(mode, integrator, coefficients, kernel, jumps, system.section.guard)
+        coefficients = self.coefficients(lower.coefficients)
+        return CompiledMode(mode, integrator, coefficients, kernel, jumps)
 
-    def _coefficients(self, expressions: list[sp.Expr]) -> Any:
+    def coefficients(self, expressions: list[sp.Expr]) -> Any:
         """Compile the folded expressions as a function of the parameters."""
         variables = {s: hy.expression(f"p{i}") for i, s in enumerate(self.system.parameters)}
         lower = Lowering(variables, (), {}, 0)
-        return _function([lower(e) for e in expressions], list(variables.values()))
+        return compile_expressions([lower(e) for e in expressions], list(variables.values()))
 
     def _event_kernel(self, mode: Mode) -> tuple[Any, tuple[Jump, ...]]:
         system = self.system
@@ -170,7 +169,7 @@ class CompiledSystem:
                     due=_due(target, mode),
                 )
             )
-        return _function(outputs, self._variables), tuple(jumps)
+        return compile_expressions(outputs, self._variables), tuple(jumps)
 
     def _guards_and_rates(self, mode: Mode, at: Mapping[sp.Symbol, Any]) -> list[Any]:
         """Each guard's value and its rate along the field, at the given values of the variables."""
@@ -191,7 +190,7 @@ class CompiledSystem:
         return Lowering({**self._states, **self._held, **self._raw}, (), definitions, 0)
 
 
-def _function(outputs: list[Any], variables: list[Any]) -> Any:
+def compile_expressions(outputs: list[Any], variables: list[Any]) -> Any:
     """Compile expressions; a function of nothing or to nothing gets one zero to work on."""
     return hy.cfunc(outputs or [hy.expression(0.0)], vars=variables or [hy.expression("unused")])
 
@@ -275,9 +274,6 @@ class BoundSystem:
         self.system = compiled.system
         self.parameters = np.asarray(parameters, dtype=float)
         self._modes: dict[str, BoundMode] = {}
-        held, section = compiled.system.held, compiled.system.section
-        self.section_requires = [(held.index(s), value) for s, value in section.requires.items()]
-        self.section_resets = [(held.index(s), value) for s, value in section.resets.items()]
 
     def mode(self, name: str) -> BoundMode:
         """Return the named mode, compiled and bound."""

@@ -19,6 +19,7 @@ from flexspine.hybrid.outcome import (
     Outcome,
     OutcomeKind,
 )
+from flexspine.hybrid.system import Section
 from flexspine.hybrid.trajectory import Arc, Event, HybridState, Trajectory
 
 # s; guards that fire closer together than this are one event.
@@ -51,18 +52,21 @@ def integrate(
     *,
     end_time: float = inf,
     crossings: int | None = None,
+    section: Section | None = None,
     section_timeout: float = SECTION_TIMEOUT,
     max_steps: int = MAX_STEPS,
     record: bool = False,
 ) -> Trajectory:
     """Run until ``end_time`` (s) or until the section was crossed ``crossings`` times.
 
-    With ``crossings``, a run that stays away from the section for ``section_timeout`` seconds
-    ends as the section's ``missed`` outcome. ``max_steps`` bounds the Taylor steps between two
-    crossings. ``record`` keeps dense output, and only then is a guard noticed that touches zero
-    without crossing it. Always returns; the outcome tells how it ended.
+    ``section`` is the system's own if none is given. With ``crossings``, a run that stays away
+    from it for ``section_timeout`` seconds ends as its ``missed`` outcome. ``max_steps``
+    bounds the Taylor steps between two crossings. ``record`` keeps dense output, and only then is
+    a guard noticed that touches zero without crossing it. Always returns; the outcome tells how it
+    ended.
     """
-    run = _Run(bound, start, end_time, crossings, section_timeout, max_steps, record)
+    watched = section or bound.system.section
+    run = _Run(bound, start, end_time, crossings, watched, section_timeout, max_steps, record)
     return run.go()
 
 
@@ -75,6 +79,7 @@ class _Run:
         start: HybridState,
         end_time: float,
         wanted: int | None,
+        section: Section,
         section_timeout: float,
         max_steps: int,
         record: bool,
@@ -82,7 +87,9 @@ class _Run:
         self.bound, self.start, self.record = bound, start, record
         self.end_time, self.wanted = end_time, wanted
         self.section_timeout, self.max_steps = section_timeout, max_steps
-        self.section = bound.system.section
+        self.section = section
+        held = bound.system.held
+        self.requires = [(held.index(s), value) for s, value in section.requires.items()]
         self.time, self.mode = start.time, start.mode
         self.states, self.held = start.states, start.held
         self.events: list[Event] = []
@@ -90,7 +97,7 @@ class _Run:
         self.arcs: list[Arc] = []
         self.steps, self.steps_left = 0, max_steps
         # The guards that fired at the latest instant; none of them may fire at it again.
-        self.instant, self.fired = start.time, [self.section.guard]
+        self.instant, self.fired = start.time, [*section.guards]
         self.limit = self._limit()
         self.outcome: Outcome | None = None
 
@@ -187,7 +194,7 @@ class _Run:
                 return self.outcome or Outcome(COMPLETED, f"reached t = {self.time:.6g} s")
             return Outcome(
                 self.section.missed,
-                f"no {self.section.guard} within {self.section_timeout:g} s after "
+                f"no {self._section_name} within {self.section_timeout:g} s after "
                 f"{len(self.crossings)} of {self.wanted}, still in {self.mode}",
             )
         return Outcome(
@@ -199,7 +206,7 @@ class _Run:
         guard = jump.guard
         if self.time - self.instant <= SIMULTANEITY and guard.name in self.fired:
             return False  # the same root once more; the integrator now cools it down
-        crossed = guard.name == self.section.guard and self._may_cross()
+        crossed = guard.name in self.section.guards and self._may_cross()
         if not (crossed or jump.acts):
             return False
         self.instant, self.fired = self.time, [guard.name]
@@ -217,18 +224,21 @@ class _Run:
         return True
 
     def _may_cross(self) -> bool:
-        return all(self.held[i] == value for i, value in self.bound.section_requires)
+        return all(self.held[i] == value for i, value in self.requires)
 
     def _section_is_due(self, mode: BoundMode, values: Array) -> bool:
         """Whether the section is crossed at the instant of another guard."""
-        jump = mode.code.section
-        if jump is None or jump.guard.name in self.fired or not self._may_cross():
+        if not self._may_cross():
             return False
-        value, rate = values[jump.value], values[jump.rate]
-        due = rate < 0 and abs(value) <= -rate * SIMULTANEITY
-        if due:
-            self.fired.append(jump.guard.name)
-        return bool(due)
+        for name in self.section.guards:
+            jump = mode.code.by_name.get(name)
+            if jump is None or name in self.fired:
+                continue
+            value, rate = values[jump.value], values[jump.rate]
+            if rate < 0 and abs(value) <= -rate * SIMULTANEITY:
+                self.fired.append(name)
+                return True
+        return False
 
     def _fire(self, jump: Jump, values: Array) -> None:
         """Jump, then let every further guard that is due at this instant fire, each once."""
@@ -308,9 +318,13 @@ class _Run:
     def _cross(self) -> None:
         """Note a point of the section."""
         self.held = self.held.copy()
-        for i, value in self.bound.section_resets:
-            self.held[i] = value
+        for symbol, value in self.section.resets.items():
+            self.held[self.bound.system.held.index(symbol)] = value
         self.crossings.append(self._here())
         self.steps_left, self.limit = self.max_steps, self._limit()
         if len(self.crossings) == self.wanted:
-            self.outcome = Outcome(COMPLETED, f"{self.wanted} x {self.section.guard}")
+            self.outcome = Outcome(COMPLETED, f"{self.wanted} x {self._section_name}")
+
+    @property
+    def _section_name(self) -> str:
+        return " or ".join(self.section.guards)

@@ -63,18 +63,38 @@ class Mode:
 
 @dataclass(frozen=True)
 class Section:
-    """A Poincare section: the firing of ``guard`` while ``requires`` holds.
+    """A Poincare section: the firing of one of ``guards`` while ``requires`` holds.
 
     ``requires`` are values of held variables, ``resets`` is applied on the section,
     ``coordinates`` name the states that identify a point of it, ``missed`` is the outcome of a
-    run that never comes back to it.
+    run that never comes back to it. ``quantities`` are further functions of a point of it, such
+    as its energy, in the definitions of ``mode``; ``conserved`` names those of them that no orbit
+    changes.
     """
 
-    guard: str
+    guards: tuple[str, ...]
     requires: Mapping[sp.Symbol, float]
     resets: Mapping[sp.Symbol, float]
     coordinates: Mapping[str, sp.Symbol]
     missed: OutcomeKind
+    mode: str = ""
+    quantities: Mapping[str, sp.Expr] = default(default_factory=dict)
+    conserved: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """A time-reversal symmetry, by the points that it leaves where they are.
+
+    An orbit that meets two such points is periodic and its own mirror image; they are half a
+    period apart. ``coordinates`` span those of the main section: by name, the states that move
+    together and their signs. The next one is on ``middle``; there, ``balance`` vanishes, given by
+    mode.
+    """
+
+    coordinates: Mapping[str, Mapping[sp.Symbol, int]]
+    middle: Section
+    balance: Mapping[str, tuple[sp.Expr, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,3 +112,4 @@ class HybridSystem:
     modes: tuple[str, ...]
     mode: Callable[[str], Mode]
     section: Section
+    reversal: Reversal | None = None

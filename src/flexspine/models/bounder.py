@@ -15,7 +15,7 @@ from typing import Any
 import sympy as sp
 
 from flexspine.hybrid.outcome import OutcomeKind
-from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Section
+from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Reversal, Section
 from flexspine.mechanics.lagrangian import Definitions, Lagrangian
 from flexspine.models.legs import (
     PHASES,
@@ -42,6 +42,9 @@ NO_APEX = OutcomeKind(
 X, Y, X_RATE, Y_RATE, DISSIPATED, GRAVITY = sp.symbols("x y xdot ydot E_d g", real=True)
 FORE, HIND = LegSymbols.of("fore"), LegSymbols.of("hind")
 
+# Where the CoM stops rising or falling while both legs stand.
+MIDSTANCE = {"lowest point": -Y_RATE, "highest point": Y_RATE}
+
 
 def gravity_field() -> Any:
     """The parameter that every model has."""
@@ -55,10 +58,12 @@ class Body:
     ``coordinates`` maps public names of the angles to (angle, rate), in rad and rad/s;
     ``parameters`` maps dotted names to letters; hips and ``low_points`` are in the inertial
     frame, the latter being what must stay above the ground besides the hips. ``power_lost`` is
-    what the spine's damper takes, in W.
+    what the spine's damper takes, in W. Where fore and hind ends are alike, looking at the body
+    from its other side turns each angle into minus that in ``mirror``.
     """
 
     coordinates: Mapping[str, tuple[sp.Symbol, sp.Symbol]]
+    mirror: Mapping[str, str]
     parameters: Mapping[str, sp.Symbol]
     definitions: Definitions
     kinetic: sp.Expr
@@ -141,15 +146,16 @@ def bounder_system(name: str, body: Body, damped_legs: bool) -> HybridSystem:
             built[phase] = _mode(body, phase, damped_legs)
         return built[phase]
 
+    conservative = not damped_legs and body.power_lost == 0
     return HybridSystem(
         name=name,
         states=states,
-        held=(FORE.toe, HIND.toe, FORE.stanced, HIND.stanced),
+        held=(FORE.toe, HIND.toe, FORE.stanced, HIND.stanced, FORE.left, HIND.left),
         parameters=(*body.parameters.values(), FORE.gamma, HIND.gamma),
         modes=PHASES,
         mode=mode,
         section=Section(
-            guard="apex",
+            guards=("apex",),
             requires={FORE.stanced: 1.0, HIND.stanced: 1.0},
             resets={FORE.stanced: 0.0, HIND.stanced: 0.0},
             coordinates={
@@ -159,7 +165,44 @@ def bounder_system(name: str, body: Body, damped_legs: bool) -> HybridSystem:
                 **{f"{n}_rate": r for n, (_, r) in body.coordinates.items()},
             },
             missed=NO_APEX,
+            mode="DF",
+            quantities={"energy": body.kinetic + body.gravity + body.spine},
+            conserved=("energy",) if conservative else (),
         ),
+        reversal=_reversal(body) if conservative else None,
+    )
+
+
+def _reversal(body: Body) -> Reversal:
+    """Running backwards and looking from the other side, which swaps the legs.
+
+    Half a stride after a symmetric apex there is another, after the stance of one leg only, which
+    left the ground at minus the angle at which the other one touches down; or, with both legs on
+    the ground, a lowest or highest point with the toes at equal distances.
+    """
+    pairs = [
+        (name, other)
+        for i, (name, other) in enumerate(body.mirror.items())
+        if other in list(body.mirror)[i:]
+    ]
+    coordinates: dict[str, dict[sp.Symbol, int]] = {"height": {Y: 1}}
+    shape: list[sp.Expr] = []
+    rates: dict[str, dict[sp.Symbol, int]] = {}
+    for name, other in pairs:
+        (angle, rate), (mirrored, mirrored_rate) = body.coordinates[name], body.coordinates[other]
+        shape.append(angle + mirrored)
+        rates[f"{name}_rate"] = {rate: 1}
+        if name != other:
+            coordinates[name] = {angle: 1, mirrored: -1}
+            shape.append(rate - mirrored_rate)
+            rates[f"{name}_rate"] |= {mirrored_rate: 1}
+    in_flight = FORE.stanced * (FORE.left + HIND.gamma) + HIND.stanced * (HIND.left + FORE.gamma)
+    return Reversal(
+        coordinates={**coordinates, "speed": {X_RATE: 1}, **rates},
+        middle=Section(
+            guards=("apex", *MIDSTANCE), requires={}, resets={}, coordinates={}, missed=NO_APEX
+        ),
+        balance={"DF": (*shape, in_flight), "DS": (*shape, FORE.toe + HIND.toe - 2 * X)},
     )
 
 
@@ -176,6 +219,8 @@ def _mode(body: Body, phase: str, damped: bool) -> Mode:
     guards += [leg.liftoff(phase_of(standing - {leg.leg.side}), DISSIPATED) for leg in stance]
     if not stance:
         guards.append(Guard("apex", Y_RATE))
+    if len(stance) == len(SIDES):
+        guards += [Guard(name, rate) for name, rate in MIDSTANCE.items()]
     # The CoM lies between the hips and the low points, so it is never the first to touch.
     lows = {f"{side} hip": HIP[side][1] for side in HIP} | dict(body.low_points)
     guards += [

@@ -123,6 +123,7 @@ def _body(damped_spine: bool) -> Body:
     torque = K_T * TWIST
     return Body(
         coordinates={"fore_pitch": (F, F_RATE), "hind_pitch": (H, H_RATE)},
+        mirror={"fore_pitch": "hind_pitch", "hind_pitch": "fore_pitch"},
         parameters={
             **fore.parameters,
             **FORE.parameters,

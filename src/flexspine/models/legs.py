@@ -46,7 +46,11 @@ class Leg(ParameterSet):
 
 @dataclass(frozen=True)
 class LegSymbols:
-    """The letters of one leg: parameters, touchdown angle, toe and stance memory."""
+    """The letters of one leg: parameters, touchdown angle, and what it remembers.
+
+    ``toe`` is where it stands or stood last (m), ``stanced`` whether it stood since the apex,
+    ``left`` its angle from the vertical at its latest lift-off (rad).
+    """
 
     side: str
     k: sp.Symbol
@@ -55,6 +59,7 @@ class LegSymbols:
     gamma: sp.Symbol
     toe: sp.Symbol
     stanced: sp.Symbol
+    left: sp.Symbol
 
     @classmethod
     def of(cls, side: str) -> LegSymbols:
@@ -64,7 +69,7 @@ class LegSymbols:
             side,
             *(
                 sp.Symbol(f"{letter}_{s}", real=True)
-                for letter in ("k", "c", "l", "gamma", "s", "n")
+                for letter in ("k", "c", "l", "gamma", "s", "n", "beta")
             ),
         )
 
@@ -134,8 +139,10 @@ class StanceLeg:
         A damper reaches zero force while the spring is still compressed. The leg is massless, so
         that energy is lost at the instant of release.
         """
-        released = {dissipated: dissipated + self.energy} if self.rate != 0 else {}
-        return Guard(f"{self.leg.side} lift-off", self.sigma, target, released, arming=Arming.LEVEL)
+        resets = {self.leg.left: sp.atan(-self.u / self.hip[1])}
+        if self.rate != 0:
+            resets[dissipated] = dissipated + self.energy
+        return Guard(f"{self.leg.side} lift-off", self.sigma, target, resets, arming=Arming.LEVEL)
 
     def observables(self) -> dict[str, sp.Expr]:
         """Toe, length, angle and ground reaction force."""

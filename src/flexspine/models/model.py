@@ -77,16 +77,17 @@ class Model:
         *,
         apex: Mapping[str, float] | None = None,
         touchdown: Mapping[str, float] | None = None,
+        origin: str = "set by user",
     ) -> Model:
         """Return the same model with some values changed, parameters by dotted name.
 
-        Raises `UnknownNameError` and `ParameterError`.
+        ``origin`` tells where they come from. Raises `UnknownNameError` and `ParameterError`.
         """
         changed = dict(parameters or {})
         names = [*changed, *(["apex"] if apex else []), *(["touchdown"] if touchdown else [])]
         source = replace(
             self.source,
-            provenance={**self.source.provenance, **dict.fromkeys(names, "set by user")},
+            provenance={**self.source.provenance, **dict.fromkeys(names, origin)},
         )
         return replace(
             self,
@@ -110,6 +111,45 @@ class Model:
         """Public names of the states, in order."""
         coordinates = ("com_x", "com_y", *self.kind.body(False).coordinates)
         return (*coordinates, *(f"{name}_rate" for name in coordinates), "dissipated_energy")
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Dotted names of ``system.parameters``, in order; the touchdown angles come last."""
+        return (*self.kind.body(False).parameters, *(f"touchdown.{side}" for side in SIDES))
+
+    @cached_property
+    def alike(self) -> bool:
+        """Whether the fore and the hind end have the same parameters."""
+        given = values(self.parameters)
+        return all(
+            value == given[name.replace("fore", "hind", 1)]
+            for name, value in given.items()
+            if name.startswith("fore.")
+        )
+
+    @cached_property
+    def mass(self) -> float:
+        """Of the whole body, in kg."""
+        given = values(self.parameters)
+        if "body.mass" in given:
+            return given["body.mass"]
+        return sum(given[f"{side}.mass"] for side in SIDES)
+
+    @cached_property
+    def scales(self) -> dict[str, float]:
+        """Natural scales: of section coordinates, touchdown angles, energy and mean speed.
+
+        Built from weight, leg length and gravity, so that figures in them know no units.
+        """
+        given = values(self.parameters)
+        gravity = given["gravity"]
+        length = sum(given[f"{side}.leg.rest_length"] for side in SIDES) / 2
+        speed, rate = (gravity * length) ** 0.5, (gravity / length) ** 0.5
+        scales = {"height": length, "speed": speed, "mean_speed": speed, "period": 1 / rate}
+        scales["energy"] = self.mass * gravity * length
+        for name in self.system.section.coordinates:
+            scales.setdefault(name, rate if name.endswith("_rate") else 1.0)
+        return scales | {f"touchdown.{side}": 1.0 for side in SIDES}
 
     @cached_property
     def parameter_vector(self) -> Array:
@@ -142,7 +182,11 @@ class Model:
         _check_numbers("toe", {**dict.fromkeys(SIDES, 0.0), **toes}, SIDES)
         states = np.array([float(start.get(name, 0.0)) for name in self.state_names])
         held = np.array(
-            [*(float(toes.get(s, states[0])) for s in SIDES), *(float(s in toes) for s in SIDES)]
+            [
+                *(float(toes.get(s, states[0])) for s in SIDES),
+                *(float(s in toes) for s in SIDES),
+                *(0.0 for _ in SIDES),
+            ]
         )
         return HybridState(0.0, phase_of(toes), states, held)
 

@@ -65,6 +65,7 @@ def rigid_body(parameters: dict[str, sp.Symbol], constants: dict[sp.Symbol, sp.E
     """
     return Body(
         coordinates={"pitch": (THETA, THETA_RATE)},
+        mirror={"pitch": "pitch"},
         parameters=parameters,
         definitions=constants,
         kinetic=M * (X_RATE**2 + Y_RATE**2) / 2 + INERTIA * THETA_RATE**2 / 2,

@@ -1,0 +1,236 @@
+"""Where something happens on a branch: located between two of its points, and labelled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from flexspine.gaits.family import (
+    BRANCHING,
+    DOUBLING,
+    FOLD,
+    NEIMARK_SACKER,
+    UNIT,
+    BranchPoint,
+    Family,
+    Refuted,
+)
+from flexspine.gaits.gait import Gait
+from flexspine.gaits.newton import Slice
+from flexspine.hybrid.compile import Array
+from flexspine.hybrid.trajectory import Trajectory
+
+# Natural units along the branch; what happens is located to this.
+LOCATED = 1e-9
+
+# How far from the unit circle a multiplier may be found that is said to cross it; a test function
+# also vanishes where two real multipliers are reciprocal.
+ON_CIRCLE = 1e-4
+
+SYMMETRY_BREAKING, CONTACTS = "symmetry breaking", "contact order"
+SECOND_TOUCHDOWN, REFUTED = "second touchdown", "not a gait"
+GRAZING, NO_FLIGHT = "grazing", "no flight at the apex"
+
+# s; over the shortest step of a branch no event moves by as much, unless the motion is torn.
+TORN = 1e-3
+
+# s; a touchdown this soon after the apex is at the apex.
+AT_APEX = 1e-6
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """Something that happens on a branch.
+
+    ``kind`` is ``fold``, ``branch point``, ``symmetry breaking``, ``period doubling``,
+    ``Neimark-Sacker``, ``multiplier +1``, ``contact order``, ``second touchdown``, ``grazing``,
+    ``no flight at the apex`` or ``not a gait``; ``detail`` says it in words. ``at`` is the last
+    point of the branch up to it, a gait to within 1e-9 of the place in natural units.
+    """
+
+    kind: str
+    detail: str
+    at: BranchPoint
+
+    @property
+    def value(self) -> float:
+        """Where, in the quantity that the branch is followed in (SI)."""
+        return self.at.value
+
+
+class Segment:
+    """The piece of a branch between two of its points, reached by slices across the chord."""
+
+    def __init__(self, family: Family, first: BranchPoint, last: BranchPoint) -> None:
+        self.family, self.first, self.last = family, first, last
+        chord = last.point - first.point
+        self.length = float(np.linalg.norm(chord))
+        self.direction = chord / self.length
+
+    def at(self, distance: float) -> BranchPoint | None:
+        """The gait on the slice at a distance along the chord, if there is one."""
+        if distance <= 0:
+            return self.first
+        if distance >= self.length:
+            return self.last
+        anchor = self.first.point + distance * self.direction
+        attempt = self.family.correct(self.curved(distance), Slice(self.direction, anchor))
+        if not attempt.solved:
+            return None
+        point = self.family.visit(attempt, self.direction)
+        return point if isinstance(point, BranchPoint) else None
+
+    def curved(self, distance: float) -> Array:
+        """A cubic through both points along their tangents."""
+        s, length = distance / self.length, self.length
+        a, b = self.first, self.last
+        slopes = [length * p.tangent / max(float(p.tangent @ self.direction), 0.1) for p in (a, b)]
+        chord = b.point - a.point
+        bulge = (1 - s) * (slopes[0] - chord) - s * (slopes[1] - chord)
+        curve: Array = a.point + s * chord + s * (1 - s) * bulge
+        return curve
+
+    def root(self, test: str) -> BranchPoint | None:
+        """Where a test function vanishes that has different signs at both ends."""
+        found: dict[float, BranchPoint] = {0.0: self.first, self.length: self.last}
+
+        def value(distance: float) -> float:
+            if distance not in found:
+                point = self.at(distance)
+                if point is None:
+                    raise LookupError
+                found[distance] = point
+            return found[distance].tests[test]
+
+        try:
+            where = brentq(value, 0.0, self.length, xtol=LOCATED, rtol=1e-12)
+        except LookupError:
+            return None  # no gait in between: what changes sign there is torn, not zero
+        return found[where]
+
+    def bisect(self, still: Callable[[BranchPoint], bool]) -> tuple[BranchPoint, BranchPoint]:
+        """The points on both sides of where ``still`` ceases to hold."""
+        low, high = 0.0, self.length
+        before, after = self.first, self.last
+        while high - low > LOCATED:
+            middle = (low + high) / 2
+            point = self.at(middle)
+            if point is None:
+                break
+            if still(point):
+                low, before = middle, point
+            else:
+                high, after = middle, point
+        return before, after
+
+
+def landmarks(family: Family, first: BranchPoint, last: BranchPoint) -> list[Landmark]:
+    """Everything that happens between two neighbouring points, in order along the branch."""
+    segment = Segment(family, first, last)
+    found = [
+        landmark
+        for test in (FOLD, BRANCHING, UNIT, DOUBLING, NEIMARK_SACKER)
+        if first.tests[test] * last.tests[test] < 0
+        and (landmark := _vanishing(segment, test)) is not None
+    ]
+    if first.gait.contacts != last.gait.contacts:
+        before, after = segment.bisect(lambda point: point.gait.contacts == first.gait.contacts)
+        change = f"{_written(before.gait)} becomes {_written(after.gait)}"
+        found.append(Landmark(CONTACTS, change, before))
+    return sorted(found, key=lambda mark: float(segment.direction @ mark.at.point))
+
+
+def _written(gait: Gait) -> str:
+    return "-".join(gait.phases)
+
+
+def _vanishing(segment: Segment, test: str) -> Landmark | None:
+    point = segment.root(test)
+    if point is None:
+        return None
+    over = segment.family.over
+    if test == FOLD:
+        way = "largest" if segment.first.tests[FOLD] > 0 else "smallest"
+        return Landmark(FOLD, f"{over} is {way} here", point)
+    if test == BRANCHING:
+        if segment.family.problem.symmetric:
+            return Landmark(SYMMETRY_BREAKING, "a branch of asymmetric gaits crosses", point)
+        return Landmark(BRANCHING, "another branch crosses", point)
+    multipliers = point.stability.level_multipliers
+    if test == NEIMARK_SACKER:
+        crossing = multipliers[np.abs(multipliers.imag) > ON_CIRCLE]
+        off = np.abs(np.abs(crossing) - 1)
+        if not off.size or off.min() > ON_CIRCLE:
+            return None
+        angle = abs(np.angle(crossing[int(np.argmin(off))]))
+        return Landmark(test, f"a pair of multipliers at +-{angle:.4f} rad", point)
+    where = 1.0 if test == UNIT else -1.0
+    if np.abs(multipliers - where).min() > ON_CIRCLE:
+        return None
+    return Landmark(test, f"a multiplier at {where:+.0f}", point)
+
+
+def refusal(family: Family, good: BranchPoint, bad: Refuted) -> Landmark:
+    """Locate where solutions cease to be gaits, between a gait and a solution that is none."""
+    flawed = bad.gait
+    direction = bad.point - good.point
+    length = float(np.linalg.norm(direction))
+    direction /= length
+    low, high = 0.0, length
+    while high - low > LOCATED:
+        middle = (low + high) / 2
+        anchor = good.point + direction * (middle - low)
+        attempt = family.correct(anchor, Slice(direction, anchor))
+        if not attempt.solved:
+            break
+        point = family.visit(attempt, direction)
+        if isinstance(point, Refuted):
+            flawed, high = point.gait, middle
+        else:
+            good, low = point, middle
+    return Landmark(*_flaw(good.gait, bad.gait, flawed), good)
+
+
+def _flaw(good: Gait, bad: Gait, nearest: Gait) -> tuple[str, str]:
+    """What a solution does that the gait before it does not; ``nearest`` is one close to that."""
+    for side in good.touchdown_angles:
+        touchdown = f"{side} touchdown"
+        if bad.contacts.count(touchdown) > good.contacts.count(touchdown):
+            return SECOND_TOUCHDOWN, (
+                f"the {side} leg grazes the ground and beyond touches down once more"
+            )
+    return REFUTED, nearest.flaw or ""
+
+
+def tear(here: BranchPoint, beyond: Trajectory) -> Landmark | None:
+    """What tears the motion at the end of a branch, told by a run from just beyond it."""
+    events = _contacts(here.gait.trajectory)
+    others = _contacts(beyond)
+    if events and events[0][1] < AT_APEX:
+        leg = events[0][0].split()[0]
+        return Landmark(
+            NO_FLIGHT, f"the {leg} leg lands at the apex, so the flight there ends", here
+        )
+    for (name, time), (other, when) in zip(events, others, strict=False):
+        if name == other and abs(time - when) < TORN:
+            continue
+        if other.endswith("touchdown") and when < time:
+            leg = other.split()[0]
+            where = f"{when:.4f} s after the apex"
+            return Landmark(
+                GRAZING, f"the {leg} leg grazes the ground {where} and beyond lands there", here
+            )
+        return None
+    return None
+
+
+def _contacts(trajectory: Trajectory) -> list[tuple[str, float]]:
+    return [
+        (name, event.time)
+        for event in trajectory.events
+        for name in event.names
+        if name.endswith(("touchdown", "lift-off"))
+    ]

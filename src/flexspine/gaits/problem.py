@@ -1,0 +1,286 @@
+"""The equations whose solutions are gaits, with exact derivatives, in natural units.
+
+Unknowns are coordinates of the apex, touchdown angles and whatever parameters are set free. A
+general gait repeats after its strides; a symmetric one meets a symmetric point half a stride after
+its apex, which takes half the work and fewer unknowns. Quantities that are fixed either leave the
+unknowns or add an equation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.functions import balance, section_quantities
+from flexspine.hybrid.integrate import integrate
+from flexspine.hybrid.outcome import Outcome
+from flexspine.hybrid.sensitivity import Deviation, propagate
+from flexspine.hybrid.trajectory import HybridState, Trajectory
+from flexspine.models.legs import SIDES
+from flexspine.models.model import Model
+from flexspine.parameters import values
+
+ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
+
+# s; no stride of a gait takes longer.
+LONGEST_STRIDE = 3.0
+
+# Taylor steps; a stride takes some 30.
+MOST_STEPS = 2000
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The equations at one point: ``residual`` (e,), or what kept the run from coming so far."""
+
+    residual: Array | None
+    trajectory: Trajectory
+    bound: BoundSystem
+
+    @property
+    def norm(self) -> float:
+        """The largest residual, infinite if there is none."""
+        return float("inf") if self.residual is None else float(np.max(np.abs(self.residual)))
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the run ended."""
+        return self.trajectory.outcome
+
+
+class Linear(NamedTuple):
+    """Derivatives in natural units: of the equations (e, u), and of quantities, by name (u,)."""
+
+    matrix: Array
+    slopes: dict[str, Array]
+
+
+class Problem:
+    """Gaits of ``model`` with some quantities fixed.
+
+    ``fixed`` maps names to values: section coordinates, ``touchdown.fore`` and ``touchdown.hind``,
+    ``energy`` (J), ``mean_speed`` (m/s). ``free`` are parameters that become unknowns. ``unknowns``
+    are in the order of every vector here; a vector is in units of ``scales``. Raises
+    `UnknownNameError`, and `ParameterError` for a symmetric problem of an animal that has no
+    symmetry.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        fixed: Mapping[str, float],
+        *,
+        free: tuple[str, ...] = (),
+        symmetric: bool = False,
+        strides: int = 1,
+        tolerance: float,
+    ) -> None:
+        self.model, self.fixed, self.free = model, dict(fixed), free
+        self.symmetric, self.strides, self.tolerance = symmetric, strides, tolerance
+        self.system = model.system
+        self.compiled = compile_system(self.system, tolerance)
+        self._check()
+        spanned = self._spanned()
+        self.unknowns = tuple(name for name in (*spanned, *ANGLES, *free) if name not in self.fixed)
+        self._quantities = [name for name in ("energy", "mean_speed") if name in self.fixed]
+        given = values(model.parameters)
+        scales = {**model.scales, **{name: abs(given[name]) or 1.0 for name in free}}
+        self._scale_of = scales
+        self.scales = np.array([scales[name] for name in self.unknowns])
+        self._lay_out(spanned)
+        coordinates = self.system.section.coordinates
+        self._section = [self.system.states.index(s) for s in coordinates.values()]
+        if not symmetric:
+            self._residual_scales = np.array([scales[name] for name in coordinates])
+        self._energy = list(self.system.section.quantities).index("energy")
+        self._x = model.state_names.index("com_x")
+
+    def _check(self) -> None:
+        model, coordinates = self.model, self.system.section.coordinates
+        known = (*coordinates, *ANGLES, "energy", "mean_speed")
+        for name in self.fixed:
+            if name not in known:
+                raise UnknownNameError("quantity", name, known)
+        parameters = model.parameter_names[: -len(ANGLES)]
+        for name in self.free:
+            if name not in parameters:
+                raise UnknownNameError("parameter", name, parameters)
+        if self.symmetric and not (self.system.reversal and model.alike):
+            reason = "its ends differ" if self.system.reversal else "it has dampers"
+            raise ParameterError(
+                f"'{model.name}' has no symmetric gaits, as {reason}",
+                "look for general ones, or make fore and hind ends alike and free of damping",
+            )
+
+    def _spanned(self) -> dict[str, dict[Any, int]]:
+        """Coordinates of the start: by name, the states each one moves."""
+        if self.symmetric and self.system.reversal:
+            return {n: dict(moves) for n, moves in self.system.reversal.coordinates.items()}
+        return {n: {s: 1} for n, s in self.system.section.coordinates.items()}
+
+    def _lay_out(self, spanned: Mapping[str, Mapping[Any, int]]) -> None:
+        """Note what each unknown moves, and what stands where nothing moves it."""
+        model, system = self.model, self.system
+        n, q = len(system.states), len(self.unknowns)
+        self._base_states = np.zeros(n)
+        self._base_parameters = model.parameter_vector.copy()
+        state_moves, parameter_moves = np.zeros((n, q)), np.zeros((len(system.parameters), q))
+        for name, moves in spanned.items():
+            rows = [system.states.index(symbol) for symbol in moves]
+            if name in self.unknowns:
+                state_moves[rows, self.unknowns.index(name)] = list(moves.values())
+            else:
+                self._base_states[rows] = np.array(list(moves.values())) * self.fixed[name]
+        for name in (*ANGLES, *self.free):
+            row = model.parameter_names.index(name)
+            if name in self.unknowns:
+                parameter_moves[row, self.unknowns.index(name)] = 1.0
+                self._base_parameters[row] = 0.0
+            else:
+                self._base_parameters[row] = self.fixed[name]
+        self._state_moves = state_moves * self.scales
+        self._parameter_moves = parameter_moves * self.scales
+        self._held = np.zeros(len(system.held))
+        self._seeds = Deviation(
+            self._state_moves, np.zeros((len(system.held), q)), self._parameter_moves
+        )
+
+    @property
+    def moves(self) -> tuple[Array, Array]:
+        """What each unknown moves, SI per natural unit: states (n, u) and parameters (p, u)."""
+        return self._state_moves, self._parameter_moves
+
+    @property
+    def surplus(self) -> int:
+        """How many more unknowns than independent equations there are.
+
+        A conserved energy makes one of the equations of repetition follow from the others.
+        """
+        section = self.system.section
+        if self.symmetric and self.system.reversal:
+            count = len(self.system.reversal.balance["DF"])
+        else:
+            count = len(section.coordinates) - len(section.conserved)
+        return len(self.unknowns) - count - len(self._quantities)
+
+    def fixing(self, name: str, value: float) -> Problem:
+        """The same problem with one more quantity fixed."""
+        return Problem(
+            self.model,
+            {**self.fixed, name: value},
+            free=self.free,
+            symmetric=self.symmetric,
+            strides=self.strides,
+            tolerance=self.tolerance,
+        )
+
+    def point(self, model: Model) -> Array:
+        """Return the vector that describes a model's apex, touchdown angles and parameters."""
+        given = {
+            **model.apex,
+            **{f"touchdown.{side}": angle for side, angle in model.touchdown.items()},
+            **values(model.parameters),
+        }
+        vector: Array = np.array([given[name] for name in self.unknowns]) / self.scales
+        return vector
+
+    def values(self, point: Array) -> dict[str, float]:
+        """Return apex, touchdown angles and free parameters of a point, by name."""
+        states, parameters = self.expand(point)
+        names = self.system.section.coordinates
+        table = dict(zip(names, states[self._section].tolist(), strict=True))
+        for name in (*ANGLES, *self.free):
+            table[name] = float(parameters[self.model.parameter_names.index(name)])
+        return table
+
+    def at(self, point: Array) -> Model:
+        """Return the model with the values of a point. Raises `ParameterError` out of bounds."""
+        table = self.values(point)
+        return self.model.with_values(
+            {name: table[name] for name in self.free},
+            apex={name: table[name] for name in self.system.section.coordinates},
+            touchdown={side: table[f"touchdown.{side}"] for side in SIDES},
+            origin="found by gait search",
+        )
+
+    def expand(self, point: Array) -> tuple[Array, Array]:
+        """Return the states and the parameters that a point stands for."""
+        return (
+            self._base_states + self._state_moves @ point,
+            self._base_parameters + self._parameter_moves @ point,
+        )
+
+    def evaluate(self, point: Array) -> Evaluation:
+        """Run from a point and evaluate the equations."""
+        states, parameters = self.expand(point)
+        bound = BoundSystem(self.compiled, parameters)
+        reversal = self.system.reversal
+        trajectory = integrate(
+            bound,
+            HybridState(0.0, self.system.section.mode, states, self._held),
+            crossings=1 if self.symmetric else self.strides,
+            section=reversal.middle if self.symmetric and reversal else None,
+            section_timeout=LONGEST_STRIDE,
+            max_steps=MOST_STEPS,
+        )
+        if not trajectory.outcome.completed:
+            return Evaluation(None, trajectory, bound)
+        return Evaluation(self._residual(trajectory), trajectory, bound)
+
+    def _residual(self, trajectory: Trajectory) -> Array:
+        start, end = trajectory.start, trajectory.end
+        if self.symmetric:
+            functions = balance(self.system, end.mode)
+            parameters = trajectory.bound.parameters
+            parts = functions(end.states, end.held, parameters).values.tolist()
+        else:
+            change = end.states[self._section] - start.states[self._section]
+            parts = (change / self._residual_scales).tolist()
+        for name in self._quantities:
+            parts.append((self.measure(trajectory, name) - self.fixed[name]) / self.scale_of(name))
+        return np.array(parts)
+
+    def measure(self, trajectory: Trajectory, name: str) -> float:
+        """Return the ``energy`` (J) or the ``mean_speed`` (m/s) of a run from apex on."""
+        start, end = trajectory.start, trajectory.end
+        if name == "mean_speed":
+            return float(end.states[self._x] - start.states[self._x]) / trajectory.duration
+        quantities = section_quantities(self.system)
+        answer = quantities(start.states, start.held, trajectory.bound.parameters)
+        return float(answer.values[self._energy])
+
+    def scale_of(self, name: str) -> float:
+        """Return the natural scale of a quantity or unknown, SI."""
+        return float(self._scale_of[name])
+
+    def linearize(self, evaluation: Evaluation) -> Linear:
+        """Differentiate the equations and the quantities at an evaluated point."""
+        trajectory = evaluation.trajectory
+        start, end, parameters = trajectory.start, trajectory.end, trajectory.bound.parameters
+        moved = propagate(trajectory, self._seeds)
+        if self.symmetric:
+            at_end = balance(self.system, end.mode)(end.states, end.held, parameters)
+            rows = (
+                at_end.by_states @ moved.states
+                + at_end.by_held @ moved.held
+                + at_end.by_parameters @ self._parameter_moves
+            )
+        else:
+            change = moved.states[self._section] - self._state_moves[self._section]
+            rows = change / self._residual_scales[:, None]
+        at_start = section_quantities(self.system)(start.states, start.held, parameters)
+        energy = at_start.by_states[self._energy] @ self._state_moves
+        energy += at_start.by_parameters[self._energy] @ self._parameter_moves
+        speed = self.measure(trajectory, "mean_speed")
+        faster = (moved.states[self._x] - speed * moved.time) / trajectory.duration
+        slopes = {
+            "energy": energy / self.scale_of("energy"),
+            "mean_speed": faster / self.scale_of("mean_speed"),
+        }
+        matrix = np.vstack([rows, *(slopes[name] for name in self._quantities)])
+        return Linear(matrix, slopes)

@@ -1,0 +1,182 @@
+"""Find gaits: seeded random starts, Newton, and every distinct solution examined."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexspine.errors import ParameterError
+from flexspine.gaits.gait import Gait, examine
+from flexspine.gaits.newton import solve
+from flexspine.gaits.problem import Problem
+from flexspine.gaits.starts import Sampler
+from flexspine.hybrid.compile import Array
+from flexspine.models.model import Model
+from flexspine.models.simulation import DEFAULT_TOLERANCE
+from flexspine.parameters import values
+
+# Natural units; gaits closer than this are one.
+DISTINCT = 1e-6
+
+DEFAULT_STARTS = 100
+
+ADVICE = {
+    "fell": "the animal fell: give a height and speed nearer to a known gait, or more starts",
+    "no_apex": "no apex came back: lower the energy or the height",
+    "stalled": "the iteration stalled where no gait is near: give more starts, or other values",
+    "left_bounds": "the iteration left the bounds: widen them",
+    "refuted": "half a stride closed but the whole did not, mostly by a second touchdown: this "
+    "family ends before these values",
+}
+OTHER = "look at the outcome of a run near these values"
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search has found: distinct gaits, and how each start fared.
+
+    ``tally`` counts starts by ``found`` or the reason that there is nothing: ``fell``, ``no_apex``
+    and other outcomes, ``stalled``, ``left_bounds``, ``refuted``. ``dropped`` counts drawn points
+    by the outcome that made them no starts at all.
+    """
+
+    gaits: tuple[Gait, ...]
+    tally: Mapping[str, int]
+    dropped: Mapping[str, int]
+
+    def __iter__(self) -> Iterator[Gait]:
+        return iter(self.gaits)
+
+    def __len__(self) -> int:
+        return len(self.gaits)
+
+    def __getitem__(self, index: int) -> Gait:
+        return self.gaits[index]
+
+    @property
+    def advice(self) -> str:
+        """What became of the starts and, if no gait was found, what to try."""
+        told = f"{sum(self.tally.values())} starts: {_counted(self.tally)}"
+        if self.dropped:
+            told += f"; drawn and dropped before: {_counted(self.dropped)}"
+        if self.gaits or not self.tally:
+            return told
+        worst = max(self.tally, key=lambda name: self.tally[name])
+        return f"{told}; {ADVICE.get(worst, OTHER)}"
+
+
+def find_gaits(
+    model: Model,
+    fixed: Mapping[str, float] | None = None,
+    *,
+    free: Mapping[str, tuple[float, float]] | None = None,
+    symmetric: bool | None = None,
+    starts: int = DEFAULT_STARTS,
+    seed: int = 0,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Search:
+    """Find all gaits of a model with some quantities fixed, from seeded random starts.
+
+    ``fixed`` maps names to values: ``energy`` (J), ``mean_speed`` (m/s), apex coordinates such as
+    ``height``, ``touchdown.fore`` or ``touchdown.hind``; all other apex coordinates and touchdown
+    angles are unknown. Without it, energy, height and mean speed are those of the model's own
+    gait. ``free`` are parameters that become unknown too, with the range to start in. A
+    ``symmetric`` gait is its own mirror image in time; None looks for symmetric and general ones.
+    ``bounds`` narrow or widen where unknowns may lie. SI and radians. The same seed finds the same
+    gaits. Raises `UnknownNameError`, and `ParameterError` where the fixed quantities leave no
+    gait alone.
+    """
+    wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
+    has_symmetry = model.alike and model.system.reversal is not None
+    kinds = [symmetric] if symmetric is not None else [True, False] if has_symmetry else [False]
+    tally: Counter[str] = Counter()
+    dropped: Counter[str] = Counter()
+    found: list[Gait] = []
+    for number, kind in enumerate(kinds):
+        problem = Problem(
+            model, wanted, free=tuple(free or ()), symmetric=kind, tolerance=tolerance
+        )
+        _check_count(problem)
+        sampler = Sampler(problem, np.random.default_rng(seed), {**(bounds or {}), **(free or {})})
+        for count in range(starts):
+            _try(problem, sampler, found, tally)
+            progress((number + (count + 1) / starts) / len(kinds))
+        dropped.update(sampler.dropped)
+    found.sort(key=lambda gait: (not gait.symmetric, gait.family, gait.model.touchdown["fore"]))
+    return Search(tuple(found), dict(tally), dict(dropped))
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in sorted(counts.items()))
+
+
+def _own_values(model: Model, tolerance: float) -> dict[str, float]:
+    """Energy, height and mean speed of the model's own gait."""
+    own = examine(model, tolerance=tolerance)
+    if own.flaw is not None:
+        raise ParameterError(
+            f"the start of '{model.name}' is no gait ({own.flaw})",
+            "say what is fixed: energy, height and mean_speed",
+        )
+    return {"energy": own.energy, "height": model.apex["height"], "mean_speed": own.mean_speed}
+
+
+def _check_count(problem: Problem) -> None:
+    surplus = problem.surplus
+    if surplus > 0:
+        raise ParameterError(
+            f"gaits with fixed {_listed(problem.fixed)} come in families of {surplus} dimension"
+            + "s" * (surplus > 1),
+            "fix more, such as energy, height and mean_speed",
+        )
+    if surplus < 0:
+        raise ParameterError(
+            f"{_listed(problem.fixed)} are {-surplus} too many to fix"
+            + ("" if problem.system.section.conserved else ", as this animal loses energy"),
+            "fix fewer, or set a parameter free",
+        )
+
+
+def _listed(names: Mapping[str, float]) -> str:
+    return ", ".join(sorted(names)) or "nothing"
+
+
+def _try(problem: Problem, sampler: Sampler, found: list[Gait], tally: Counter[str]) -> None:
+    """Solve from one start and keep what is new."""
+    attempt = solve(problem, sampler.draw(), bounds=sampler.limits)
+    if not attempt.solved:
+        tally[attempt.reason or ""] += 1
+        return
+    gait = confirm(problem, attempt.point)
+    if gait is None:
+        tally["refuted"] += 1
+        return
+    tally["found"] += 1
+    if not any(same_orbit(gait, other) for other in found):
+        found.append(gait)
+
+
+def confirm(problem: Problem, point: Array) -> Gait | None:
+    """Simulate a solution anew; None if it does not come back, or is no gait at all."""
+    try:
+        gait = examine(problem.at(point), strides=problem.strides, tolerance=problem.tolerance)
+    except ParameterError:
+        return None
+    return gait if gait.flaw is None else None
+
+
+def same_orbit(one: Gait, other: Gait) -> bool:
+    """Whether two gaits of one animal are the same orbit, perhaps seen from different apexes."""
+    angles = [abs(one.model.touchdown[s] - other.model.touchdown[s]) for s in one.model.touchdown]
+    if max(angles) > DISTINCT:
+        return False
+    parameters, others = values(one.model.parameters), values(other.model.parameters)
+    if any(abs(parameters[n] - others[n]) > DISTINCT * abs(others[n]) for n in parameters):
+        return False
+    start = one.orbit[0]
+    return bool(np.any(np.max(np.abs(other.orbit - start), axis=1) < DISTINCT))
