@@ -21,7 +21,6 @@ EFFECTIVE = INERTIA + MASS / 2 * OFFSET**2
 COUPLING = MASS / 2 * OFFSET**2
 NEAR, FAR = OFFSET / 2, OFFSET + HIP - OFFSET / 2
 ANGLE = {"fore": 0.4612813446910027, "hind": 0.5623577670742721}
-LANDING = {side: LENGTH * cos(angle) for side, angle in ANGLE.items()}
 START = (
     0.0, 0.32, 0.10385204124646978, -0.10385204124646978,
     4.50071645170713, 0.0, -3.89389870409466, -3.89389870409466,
@@ -102,7 +101,7 @@ def _terminal(event: Event) -> Event:
     return event
 
 
-def _leg_event(side: str, toes: Toes) -> Event:
+def _leg_event(side: str, toes: Toes, angle: float) -> Event:
     if side in toes:
 
         def liftoff(_t: float, z: Any) -> float:
@@ -110,19 +109,24 @@ def _leg_event(side: str, toes: Toes) -> Event:
             return LENGTH - sqrt((x - toes[side]) ** 2 + y * y)
 
         return _terminal(liftoff)
-    return _terminal(lambda _t, z: _hip(side, z)[1] - LANDING[side])
+    landing = LENGTH * cos(angle)
+    return _terminal(lambda _t, z: _hip(side, z)[1] - landing)
 
 
 def stride(
-    method: str, tolerance: float, field: Callable[[Toes], Any] = scalar_field
+    method: str,
+    tolerance: float,
+    field: Callable[[Toes], Any] = scalar_field,
+    start: Any = START,
+    angles: dict[str, float] = ANGLE,
 ) -> tuple[float, Any]:
     """One stride from apex to apex; returns period and end state."""
-    z, t = np.array(START), 0.0
+    z, t = np.array(start), 0.0
     toes: Toes = {}
     landed: set[str] = set()
     sides = ("fore", "hind")
     while True:
-        events = [_leg_event(side, dict(toes)) for side in sides]
+        events = [_leg_event(side, dict(toes), angles[side]) for side in sides]
         if not toes and len(landed) == 2:
             events.append(_terminal(lambda _t, z: z[5]))
         done = solve_ivp(
@@ -136,5 +140,5 @@ def stride(
         if side in toes:
             del toes[side]
         else:
-            toes[side] = _hip(side, z)[0] + LENGTH * sin(ANGLE[side])
+            toes[side] = _hip(side, z)[0] + LENGTH * sin(angles[side])
             landed.add(side)

@@ -11,20 +11,31 @@ import typer
 
 from flexspine.cli.options import Apex, Assignments, Json, Touchdown, assignments
 from flexspine.cli.output import print_json, steps
+from flexspine.errors import InputError
 
 DEFAULT_PRESET = "kamimura2015-flexible"
 
+Preset = Annotated[
+    str | None,
+    typer.Option(
+        help=f"A preset (see 'flexspine presets') or a TOML file (default {DEFAULT_PRESET})."
+    ),
+]
+GaitFile = Annotated[
+    Path | None,
+    typer.Option("--gait", metavar="FILE", help="A gait saved by 'flexspine gait --out'."),
+]
+
 
 def bound(
-    preset: Annotated[
-        str, typer.Option(help="A preset (see 'flexspine presets') or a TOML file.")
-    ] = DEFAULT_PRESET,
+    preset: Preset = None,
+    gait: GaitFile = None,
     set_: Assignments = None,
     apex: Apex = None,
     touchdown: Touchdown = None,
     strides: Annotated[
         int | None,
-        typer.Option(min=1, help="How many strides to run (1 unless --duration is given)."),
+        typer.Option(min=1, help="How many strides to run (default: 1, or the period of --gait)."),
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="Run this many seconds instead of counting strides.")
@@ -44,7 +55,7 @@ def bound(
     ] = True,
     json: Json = False,
 ) -> int:
-    """Simulate bounding from an apex.
+    """Simulate bounding from an apex, or a saved gait.
 
     Units are SI and radians. Exit code 0: all strides done; 1: the run ended otherwise, for
     example by a fall; 2: bad input; 3: the machine failed; 130: interrupted.
@@ -53,8 +64,11 @@ def bound(
         flexspine bound --strides 3 --out results
 
         flexspine bound --set spine.stiffness=240 --apex height=0.33 --json
+
+        flexspine bound --gait results/gait-1.json --strides 10
     """
     from flexspine.cli.results import ResultDirectory
+    from flexspine.gaits.files import load_gait
     from flexspine.gaits.record import run_record
     from flexspine.models.dataset import DEFAULT_INTERVAL, check_interval
     from flexspine.models.presets import load_model
@@ -63,12 +77,21 @@ def bound(
     signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
     step = DEFAULT_INTERVAL if interval is None else interval
     check_interval(step)
-    model = load_model(
-        preset,
-        assignments("--set", set_),
-        apex=assignments("--apex", apex),
-        touchdown=assignments("--touchdown", touchdown),
-    )
+    if gait is not None:
+        refuse_besides_gait(
+            {"--preset": preset, "--set": set_, "--apex": apex, "--touchdown": touchdown}
+        )
+        saved = load_gait(gait)
+        model = saved.model
+        if duration is None:
+            strides = strides or saved.strides
+    else:
+        model = load_model(
+            DEFAULT_PRESET if preset is None else preset,
+            assignments("--set", set_),
+            apex=assignments("--apex", apex),
+            touchdown=assignments("--touchdown", touchdown),
+        )
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
@@ -89,6 +112,17 @@ def bound(
         if out is not None:
             print(f"results in {out}")
     return 0 if run.outcome.completed else 1
+
+
+def refuse_besides_gait(options: dict[str, Any]) -> None:
+    """Raise `InputError` if an option is given that would change a saved gait."""
+    for option, given in options.items():
+        if given not in (None, []):
+            raise InputError(
+                f"{option} and --gait are both given",
+                f"leave {option}, as a gait is the gait of one animal; 'flexspine gait' finds "
+                "those of others",
+            )
 
 
 def _report(record: dict[str, Any]) -> str:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 ANIMATIONS = ("animation.mp4", "animation.gif")
-PICTURES = ("figure.png", "strip.png", *ANIMATIONS)
+PICTURES = re.compile("|".join(map(re.escape, ("figure.png", "strip.png", *ANIMATIONS))))
 
 
 class ResultDirectory:
@@ -43,21 +46,32 @@ class ResultDirectory:
                 f"cannot write to '{path}' ({failure.strerror})", "give --out another directory"
             ) from None
 
+    @contextmanager
+    def stage(self, replaced: re.Pattern[str] | None = None) -> Iterator[Path]:
+        """Give a place for files, which come here together at the end of the block, if it succeeds.
+
+        Files whose names match ``replaced`` are of an earlier run unless they come anew, and would
+        pass for some of this one: they go.
+        """
+        stage = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.path))
+        try:
+            yield stage
+            made = sorted(stage.iterdir())
+            for file in made:
+                file.replace(self.path / file.name)
+            older = [] if replaced is None else sorted(self.path.iterdir())
+            for name in {file.name for file in older} - {file.name for file in made}:
+                if replaced is not None and replaced.fullmatch(name):
+                    (self.path / name).unlink(missing_ok=True)
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
+
     def write(
         self, run: Run, record: dict[str, Any], interval: float, animation: bool, progress: Steps
     ) -> None:
         """Write everything there is about a run."""
-        stage = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.path))
-        try:
+        with self.stage(PICTURES) as stage:
             _write_all(stage, run, record, interval, animation, progress)
-            made = sorted(stage.iterdir())
-            for file in made:
-                file.replace(self.path / file.name)
-            # A picture of an earlier run would pass for one of this run.
-            for name in {*PICTURES} - {file.name for file in made}:
-                (self.path / name).unlink(missing_ok=True)
-        finally:
-            shutil.rmtree(stage, ignore_errors=True)
 
     def __enter__(self) -> Self:
         return self
@@ -72,6 +86,11 @@ class ResultDirectory:
                 path.rmdir()
             except OSError:
                 return
+
+
+def write_json(record: dict[str, Any], path: Path) -> None:
+    """Write a record for people and programs to read."""
+    path.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _write_all(
@@ -90,7 +109,7 @@ def _write_all(
     write_netcdf(dataset, stage / "trajectory.nc")
     write_csv(dataset, stage / "trajectory.csv")
     write_events_csv(dataset, stage / "events.csv")
-    (stage / "summary.json").write_text(json.dumps(record, indent=2, allow_nan=False) + "\n")
+    write_json(record, stage / "summary.json")
     if dataset.sizes["time"] < 2:
         return  # nothing to draw
     from flexspine.report.animation import animate, strip

@@ -63,8 +63,7 @@ class Family:
         system, model = problem.system, problem.model
         coordinates = system.section.coordinates
         self._inputs = (*coordinates, *ANGLES, *problem.free)
-        scales = {**model.scales, **{name: problem.scale_of(name) for name in problem.free}}
-        self._scales = np.array([scales[name] for name in self._inputs])
+        self._scales = np.array([problem.scale_of(name) for name in self._inputs])
         self._columns = [i for i, name in enumerate(self._inputs) if name not in problem.fixed]
         self._rows = len(coordinates)
         self.parameters = tuple(
@@ -124,9 +123,10 @@ class Family:
         rows, start = section_rows(system), returned.trajectory.start
         parameters = returned.trajectory.bound.parameters
         images = returned.states[rows] - np.eye(self._rows, len(self._inputs))
-        scaled = images * self._scales / self._scales[: self._rows, None]
+        units = self._units(parameters)
+        scaled = images * units / self._scales[: self._rows, None]
         quantities = section_quantities(system)(start.states, start.held, parameters)
-        at = [system.parameters.index(p) for p in self.parameters]
+        at = [system.places[p] for p in self.parameters]
         energy = np.concatenate([quantities.by_states[0][rows], quantities.by_parameters[0][at]])
         if system.section.conserved:
             if self._dropped is None:
@@ -139,23 +139,32 @@ class Family:
         extra = {"energy": energy, "mean_speed": faster}
         for name, row in extra.items():
             if name in problem.fixed:
-                scaled = np.vstack([scaled, row * self._scales / problem.scale_of(name)])
+                scaled = np.vstack([scaled, row * units / problem.scale_of(name)])
         matrix: Array = scaled[:, self._columns]
         return matrix
 
-    def general_direction(self, direction: Array) -> Array:
+    def _units(self, parameters: Array) -> Array:
+        """What a natural unit of each input is, SI."""
+        units, problem = self._scales.copy(), self.problem
+        for name in problem.free:
+            value = parameters[problem.model.parameter_names.index(name)]
+            units[self._inputs.index(name)] = problem.unit_of(name, float(value))
+        return units
+
+    def general_direction(self, direction: Array, at_parameters: Array) -> Array:
         """A direction of this family's unknowns among those of the general equations."""
         problem = self.problem
-        states, parameters = problem.moves
+        states, parameters = problem.moves(at_parameters)
         rows = section_rows(problem.system)
-        at = [problem.system.parameters.index(p) for p in self.parameters]
+        at = [problem.system.places[p] for p in self.parameters]
         whole: Array = np.concatenate([states[rows] @ direction, parameters[at] @ direction])
-        general: Array = (whole / self._scales)[self._columns]
+        general: Array = (whole / self._units(at_parameters))[self._columns]
         return general
 
     def _branching(self, returned: ReturnMap, tangent: Array) -> float:
         """Changes sign where another family crosses this one."""
-        matrix, along = self.general_matrix(returned), self.general_direction(tangent)
+        matrix = self.general_matrix(returned)
+        along = self.general_direction(tangent, returned.trajectory.bound.parameters)
         bordered = np.vstack([matrix, along / np.linalg.norm(along)])
         return float(np.linalg.det(bordered))
 

@@ -47,7 +47,7 @@ class Gait:
             return float("inf")
         start, end = self.trajectory.start.states, self.trajectory.end.states
         system, scales = self.model.system, self.model.scales
-        places = {n: system.states.index(s) for n, s in system.section.coordinates.items()}
+        places = {n: system.places[s] for n, s in system.section.coordinates.items()}
         return max(abs(float(end[i] - start[i])) / scales[n] for n, i in places.items())
 
     @cached_property

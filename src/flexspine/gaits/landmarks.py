@@ -21,6 +21,7 @@ from flexspine.gaits.family import (
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.newton import Slice
 from flexspine.hybrid.compile import Array
+from flexspine.hybrid.outcome import GRAZED
 from flexspine.hybrid.trajectory import Trajectory
 
 # Natural units along the branch; what happens is located to this.
@@ -138,13 +139,21 @@ def landmarks(family: Family, first: BranchPoint, last: BranchPoint) -> list[Lan
     ]
     if first.gait.contacts != last.gait.contacts:
         before, after = segment.bisect(lambda point: point.gait.contacts == first.gait.contacts)
-        change = f"{_written(before.gait)} becomes {_written(after.gait)}"
-        found.append(Landmark(CONTACTS, change, before))
+        found.append(Landmark(CONTACTS, _change(before.gait, after.gait), before))
     return sorted(found, key=lambda mark: float(segment.direction @ mark.at.point))
 
 
-def _written(gait: Gait) -> str:
-    return "-".join(gait.phases)
+def _change(before: Gait, after: Gait) -> str:
+    if before.phases != after.phases:
+        return f"{'-'.join(before.phases)} becomes {'-'.join(after.phases)}"
+    for side in after.touchdown_angles:
+        more = after.contacts.count(f"{side} touchdown") - before.contacts.count(
+            f"{side} touchdown"
+        )
+        if more:
+            begins = "begins" if more > 0 else "ceases"
+            return f"the {side} leg {begins} to touch the ground without bearing load"
+    return "the order of simultaneous contacts changes"
 
 
 def _vanishing(segment: Segment, test: str) -> Landmark | None:
@@ -207,6 +216,8 @@ def _flaw(good: Gait, bad: Gait, nearest: Gait) -> tuple[str, str]:
 
 def tear(here: BranchPoint, beyond: Trajectory) -> Landmark | None:
     """What tears the motion at the end of a branch, told by a run from just beyond it."""
+    if beyond.outcome.kind is GRAZED:
+        return Landmark(GRAZING, f"the motion grazes: {beyond.outcome.message}", here)
     events = _contacts(here.gait.trajectory)
     others = _contacts(beyond)
     if events and events[0][1] < AT_APEX:

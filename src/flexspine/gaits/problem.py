@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,15 +89,15 @@ class Problem:
         spanned = self._spanned()
         self.unknowns = tuple(name for name in (*spanned, *ANGLES, *free) if name not in self.fixed)
         self._quantities = [name for name in ("energy", "mean_speed") if name in self.fixed]
+        self._scale_of = {**model.scales, **dict.fromkeys(free, 1.0)}
+        self.scales = np.array([self._scale_of[name] for name in self.unknowns])
         given = values(model.parameters)
-        scales = {**model.scales, **{name: abs(given[name]) or 1.0 for name in free}}
-        self._scale_of = scales
-        self.scales = np.array([scales[name] for name in self.unknowns])
+        self._logarithmic = {name: given[name] for name in free if given[name] > 0}
         self._lay_out(spanned)
         coordinates = self.system.section.coordinates
-        self._section = [self.system.states.index(s) for s in coordinates.values()]
+        self._section = [self.system.places[s] for s in coordinates.values()]
         if not symmetric:
-            self._residual_scales = np.array([scales[name] for name in coordinates])
+            self._residual_scales = np.array([model.scales[name] for name in coordinates])
         self._energy = list(self.system.section.quantities).index("energy")
         self._x = model.state_names.index("com_x")
 
@@ -110,12 +111,27 @@ class Problem:
         for name in self.free:
             if name not in parameters:
                 raise UnknownNameError("parameter", name, parameters)
-        if self.symmetric and not (self.system.reversal and model.alike):
-            reason = "its ends differ" if self.system.reversal else "it has dampers"
+        if self.symmetric:
+            self._check_symmetry()
+
+    def _check_symmetry(self) -> None:
+        model, reversal = self.model, self.system.reversal
+        if not (reversal and model.alike):
+            reason = "its ends differ" if reversal else "it has dampers"
             raise ParameterError(
                 f"'{model.name}' has no symmetric gaits, as {reason}",
                 "look for general ones, or make fore and hind ends alike and free of damping",
             )
+        for name in self.fixed:
+            if name in self.system.section.coordinates and name not in reversal.coordinates:
+                raise ParameterError(
+                    f"symmetry decides '{name}' already", "leave it, or look for general gaits"
+                )
+        for name in self.free:
+            if name.split(".")[0] in SIDES:
+                raise ParameterError(
+                    f"'{name}' would make the ends differ", "look for general gaits"
+                )
 
     def _spanned(self) -> dict[str, dict[Any, int]]:
         """Coordinates of the start: by name, the states each one moves."""
@@ -131,7 +147,7 @@ class Problem:
         self._base_parameters = model.parameter_vector.copy()
         state_moves, parameter_moves = np.zeros((n, q)), np.zeros((len(system.parameters), q))
         for name, moves in spanned.items():
-            rows = [system.states.index(symbol) for symbol in moves]
+            rows = [system.places[symbol] for symbol in moves]
             if name in self.unknowns:
                 state_moves[rows, self.unknowns.index(name)] = list(moves.values())
             else:
@@ -145,15 +161,30 @@ class Problem:
                 self._base_parameters[row] = self.fixed[name]
         self._state_moves = state_moves * self.scales
         self._parameter_moves = parameter_moves * self.scales
+        self._log_rows = [model.parameter_names.index(name) for name in self._logarithmic]
+        self._log_columns = [self.unknowns.index(name) for name in self._logarithmic]
         self._held = np.zeros(len(system.held))
-        self._seeds = Deviation(
-            self._state_moves, np.zeros((len(system.held), q)), self._parameter_moves
-        )
 
-    @property
-    def moves(self) -> tuple[Array, Array]:
-        """What each unknown moves, SI per natural unit: states (n, u) and parameters (p, u)."""
-        return self._state_moves, self._parameter_moves
+    def moves(self, parameters: Array) -> tuple[Array, Array]:
+        """What each unknown moves, SI per natural unit: states (n, u) and parameters (p, u).
+
+        A free parameter that is positive counts by its logarithm, so it depends on where it is.
+        """
+        moves = self._parameter_moves
+        if self._log_rows:
+            moves = moves.copy()
+            moves[self._log_rows, self._log_columns] = parameters[self._log_rows]
+        return self._state_moves, moves
+
+    def unit_of(self, name: str, value: float) -> float:
+        """What a natural unit of an unknown is at a value of it, SI."""
+        return value if name in self._logarithmic else self.scale_of(name)
+
+    def coordinate(self, name: str, value: float) -> float:
+        """The entry of a vector that stands for a value of an unknown, SI."""
+        if name in self._logarithmic:
+            return log(value / self._logarithmic[name])
+        return value / self.scale_of(name)
 
     @property
     def surplus(self) -> int:
@@ -186,8 +217,7 @@ class Problem:
             **{f"touchdown.{side}": angle for side, angle in model.touchdown.items()},
             **values(model.parameters),
         }
-        vector: Array = np.array([given[name] for name in self.unknowns]) / self.scales
-        return vector
+        return np.array([self.coordinate(name, given[name]) for name in self.unknowns])
 
     def values(self, point: Array) -> dict[str, float]:
         """Return apex, touchdown angles and free parameters of a point, by name."""
@@ -210,10 +240,11 @@ class Problem:
 
     def expand(self, point: Array) -> tuple[Array, Array]:
         """Return the states and the parameters that a point stands for."""
-        return (
-            self._base_states + self._state_moves @ point,
-            self._base_parameters + self._parameter_moves @ point,
-        )
+        parameters = self._base_parameters + self._parameter_moves @ point
+        if self._log_rows:
+            bases = list(self._logarithmic.values())
+            parameters[self._log_rows] = bases * np.exp(point[self._log_columns])
+        return self._base_states + self._state_moves @ point, parameters
 
     def evaluate(self, point: Array) -> Evaluation:
         """Run from a point and evaluate the equations."""
@@ -237,13 +268,19 @@ class Problem:
         if self.symmetric:
             functions = balance(self.system, end.mode)
             parameters = trajectory.bound.parameters
-            parts = functions(end.states, end.held, parameters).values.tolist()
+            answer = functions(end.states, end.held, parameters).values
+            parts = (answer / self._balance_scales(end.mode)).tolist()
         else:
             change = end.states[self._section] - start.states[self._section]
             parts = (change / self._residual_scales).tolist()
         for name in self._quantities:
             parts.append((self.measure(trajectory, name) - self.fixed[name]) / self.scale_of(name))
         return np.array(parts)
+
+    def _balance_scales(self, mode: str) -> Array:
+        reversal = self.system.reversal
+        assert reversal is not None
+        return np.array([self.scale_of(name) for name in reversal.balance[mode]])
 
     def measure(self, trajectory: Trajectory, name: str) -> float:
         """Return the ``energy`` (J) or the ``mean_speed`` (m/s) of a run from apex on."""
@@ -262,20 +299,22 @@ class Problem:
         """Differentiate the equations and the quantities at an evaluated point."""
         trajectory = evaluation.trajectory
         start, end, parameters = trajectory.start, trajectory.end, trajectory.bound.parameters
-        moved = propagate(trajectory, self._seeds)
+        state_moves, parameter_moves = self.moves(parameters)
+        still = np.zeros((len(self.system.held), len(self.unknowns)))
+        moved = propagate(trajectory, Deviation(state_moves, still, parameter_moves))
         if self.symmetric:
             at_end = balance(self.system, end.mode)(end.states, end.held, parameters)
             rows = (
                 at_end.by_states @ moved.states
                 + at_end.by_held @ moved.held
-                + at_end.by_parameters @ self._parameter_moves
-            )
+                + at_end.by_parameters @ parameter_moves
+            ) / self._balance_scales(end.mode)[:, None]
         else:
-            change = moved.states[self._section] - self._state_moves[self._section]
+            change = moved.states[self._section] - state_moves[self._section]
             rows = change / self._residual_scales[:, None]
         at_start = section_quantities(self.system)(start.states, start.held, parameters)
-        energy = at_start.by_states[self._energy] @ self._state_moves
-        energy += at_start.by_parameters[self._energy] @ self._parameter_moves
+        energy = at_start.by_states[self._energy] @ state_moves
+        energy += at_start.by_parameters[self._energy] @ parameter_moves
         speed = self.measure(trajectory, "mean_speed")
         faster = (moved.states[self._x] - speed * moved.time) / trajectory.duration
         slopes = {

@@ -56,7 +56,7 @@ class ReturnMap:
 
 def section_rows(system: HybridSystem) -> list[int]:
     """Where the section's coordinates stand among the states."""
-    return [system.states.index(symbol) for symbol in system.section.coordinates.values()]
+    return [system.places[symbol] for symbol in system.section.coordinates.values()]
 
 
 def linearize(trajectory: Trajectory, parameters: Sequence[sp.Symbol] = ()) -> ReturnMap:
@@ -67,7 +67,7 @@ def linearize(trajectory: Trajectory, parameters: Sequence[sp.Symbol] = ()) -> R
     states = np.zeros((len(system.states), d + k))
     states[at, range(d)] = 1.0
     moved = np.zeros((len(system.parameters), d + k))
-    moved[[system.parameters.index(p) for p in parameters], range(d, d + k)] = 1.0
+    moved[[system.places[p] for p in parameters], range(d, d + k)] = 1.0
     start = Deviation(states, np.zeros((len(system.held), d + k)), moved)
     end = propagate(trajectory, start)
     return ReturnMap(trajectory, end.states, end.time, end.rates)

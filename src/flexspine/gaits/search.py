@@ -92,7 +92,11 @@ def find_gaits(
     gait alone.
     """
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
-    has_symmetry = model.alike and model.system.reversal is not None
+    reversal = model.system.reversal
+    coordinates = wanted.keys() & model.system.section.coordinates.keys()
+    has_symmetry = (
+        reversal is not None and model.alike and coordinates <= reversal.coordinates.keys()
+    )
     kinds = [symmetric] if symmetric is not None else [True, False] if has_symmetry else [False]
     tally: Counter[str] = Counter()
     dropped: Counter[str] = Counter()

@@ -48,8 +48,11 @@ class Sampler:
                     f"bounds for '{name}', which is not unknown",
                     f"unknown are {', '.join(problem.unknowns)}",
                 )
-        pairs = [bounds.get(name, self._usual(name)) for name in problem.unknowns]
-        self.low, self.high = np.array(pairs).T / problem.scales
+        pairs = [
+            [problem.coordinate(name, value) for value in bounds.get(name, self._usual(name))]
+            for name in problem.unknowns
+        ]
+        self.low, self.high = np.array(pairs).T
         # Solutions may lie outside of where starts do, but not by far.
         room = self.high - self.low
         given = np.array([name in bounds for name in problem.unknowns])

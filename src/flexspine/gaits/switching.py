@@ -65,7 +65,7 @@ def _across(general: Family, family: Family, crossing: BranchPoint) -> Array:
     model, problem = crossing.gait.model, general.problem
     period = integrate(model.bind(problem.tolerance), model.apex_state(), crossings=problem.strides)
     matrix = general.general_matrix(linearize(period, general.parameters))
-    along = family.general_direction(crossing.tangent)
+    along = family.general_direction(crossing.tangent, model.parameter_vector)
     along = along / np.linalg.norm(along)
     kernel = np.linalg.svd(matrix)[2][-2:]
     across = kernel - np.outer(kernel @ along, along)

@@ -65,4 +65,5 @@ def balance(system: HybridSystem, mode: str) -> Functions:
     """What vanishes at a symmetric point in ``mode``."""
     if system.reversal is None:
         raise ValueError(f"{system.name} has no reversal")
-    return Functions(system, system.mode(mode).definitions, system.reversal.balance[mode])
+    parts = tuple(system.reversal.balance[mode].values())
+    return Functions(system, system.mode(mode).definitions, parts)

@@ -88,8 +88,8 @@ class _Run:
         self.end_time, self.wanted = end_time, wanted
         self.section_timeout, self.max_steps = section_timeout, max_steps
         self.section = section
-        held = bound.system.held
-        self.requires = [(held.index(s), value) for s, value in section.requires.items()]
+        places = bound.system.places
+        self.requires = [(places[s], value) for s, value in section.requires.items()]
         self.time, self.mode = start.time, start.mode
         self.states, self.held = start.states, start.held
         self.events: list[Event] = []
@@ -319,7 +319,7 @@ class _Run:
         """Note a point of the section."""
         self.held = self.held.copy()
         for symbol, value in self.section.resets.items():
-            self.held[self.bound.system.held.index(symbol)] = value
+            self.held[self.bound.system.places[symbol]] = value
         self.crossings.append(self._here())
         self.steps_left, self.limit = self.max_steps, self._limit()
         if len(self.crossings) == self.wanted:

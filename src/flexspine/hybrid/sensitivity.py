@@ -85,12 +85,15 @@ class _Propagation:
         for first in range(0, self.count, LANES):
             part = slice(first, min(first + LANES, self.count))
             width = part.stop - first
+            moving, pushed = self.deviations[:n, part], self.deviations[flow.rows, part]
+            if first and not (moving.any() or pushed.any()):
+                continue  # what does not deviate will not do so before the next event
             if width < LANES:  # idle lanes
                 state[n:] = 0.0
                 numbers[flow.deviations] = 0.0
             state[:n] = states[:, None]
-            state[n:, :width] = self.deviations[:n, part]
-            numbers[flow.deviations, :width] = self.deviations[flow.rows, part]
+            state[n:, :width] = moving
+            numbers[flow.deviations, :width] = pushed
             integrator.set_time(0.0)
             integrator.propagate_until(duration)
             self.deviations[:n, part] = state[n:, :width]
@@ -124,6 +127,6 @@ class _Propagation:
 
     def _reset(self) -> None:
         """What the section sets does not deviate."""
-        held = self.bound.system.held
+        places = self.bound.system.places
         for symbol in self.bound.system.section.resets:
-            self.deviations[self.n + held.index(symbol)] = 0.0
+            self.deviations[self.n + places[symbol]] = 0.0

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as default
 from enum import Enum
+from functools import cached_property
 
 import sympy as sp
 
@@ -89,12 +90,12 @@ class Reversal:
     An orbit that meets two such points is periodic and its own mirror image; they are half a
     period apart. ``coordinates`` span those of the main section: by name, the states that move
     together and their signs. The next one is on ``middle``; there, ``balance`` vanishes, given by
-    mode.
+    mode, each part under the name of a coordinate or parameter that has its unit.
     """
 
     coordinates: Mapping[str, Mapping[sp.Symbol, int]]
     middle: Section
-    balance: Mapping[str, tuple[sp.Expr, ...]]
+    balance: Mapping[str, Mapping[str, sp.Expr]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +114,9 @@ class HybridSystem:
     mode: Callable[[str], Mode]
     section: Section
     reversal: Reversal | None = None
+
+    @cached_property
+    def places(self) -> dict[sp.Symbol, int]:
+        """Where each symbol stands among the states, the held variables or the parameters."""
+        groups = (self.states, self.held, self.parameters)
+        return {symbol: i for group in groups for i, symbol in enumerate(group)}

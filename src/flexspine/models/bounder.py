@@ -42,8 +42,11 @@ NO_APEX = OutcomeKind(
 X, Y, X_RATE, Y_RATE, DISSIPATED, GRAVITY = sp.symbols("x y xdot ydot E_d g", real=True)
 FORE, HIND = LegSymbols.of("fore"), LegSymbols.of("hind")
 
-# Where the CoM stops rising or falling while both legs stand.
-MIDSTANCE = {"lowest point": -Y_RATE, "highest point": Y_RATE}
+# The CoM passes the middle between the toes while both legs stand.
+MIDSTANCE = "mid-stance"
+
+# No orbit is half done after both stances; this keeps its balance from vanishing.
+UNBALANCED = 10
 
 
 def gravity_field() -> Any:
@@ -178,7 +181,7 @@ def _reversal(body: Body) -> Reversal:
 
     Half a stride after a symmetric apex there is another, after the stance of one leg only, which
     left the ground at minus the angle at which the other one touches down; or, with both legs on
-    the ground, a lowest or highest point with the toes at equal distances.
+    the ground, a lowest or highest point midway between the toes.
     """
     pairs = [
         (name, other)
@@ -186,23 +189,27 @@ def _reversal(body: Body) -> Reversal:
         if other in list(body.mirror)[i:]
     ]
     coordinates: dict[str, dict[sp.Symbol, int]] = {"height": {Y: 1}}
-    shape: list[sp.Expr] = []
+    shape: dict[str, sp.Expr] = {}
     rates: dict[str, dict[sp.Symbol, int]] = {}
     for name, other in pairs:
         (angle, rate), (mirrored, mirrored_rate) = body.coordinates[name], body.coordinates[other]
-        shape.append(angle + mirrored)
+        shape[name] = angle + mirrored
         rates[f"{name}_rate"] = {rate: 1}
         if name != other:
             coordinates[name] = {angle: 1, mirrored: -1}
-            shape.append(rate - mirrored_rate)
+            shape[f"{name}_rate"] = rate - mirrored_rate
             rates[f"{name}_rate"] |= {mirrored_rate: 1}
     in_flight = FORE.stanced * (FORE.left + HIND.gamma) + HIND.stanced * (HIND.left + FORE.gamma)
+    in_flight += UNBALANCED * FORE.stanced * HIND.stanced
     return Reversal(
         coordinates={**coordinates, "speed": {X_RATE: 1}, **rates},
         middle=Section(
-            guards=("apex", *MIDSTANCE), requires={}, resets={}, coordinates={}, missed=NO_APEX
+            guards=("apex", MIDSTANCE), requires={}, resets={}, coordinates={}, missed=NO_APEX
         ),
-        balance={"DF": (*shape, in_flight), "DS": (*shape, FORE.toe + HIND.toe - 2 * X)},
+        balance={
+            "DF": {**shape, "touchdown.fore": in_flight},
+            "DS": {**shape, "speed": Y_RATE},
+        },
     )
 
 
@@ -220,7 +227,7 @@ def _mode(body: Body, phase: str, damped: bool) -> Mode:
     if not stance:
         guards.append(Guard("apex", Y_RATE))
     if len(stance) == len(SIDES):
-        guards += [Guard(name, rate) for name, rate in MIDSTANCE.items()]
+        guards.append(Guard(MIDSTANCE, FORE.toe + HIND.toe - 2 * X))
     # The CoM lies between the hips and the low points, so it is never the first to touch.
     lows = {f"{side} hip": HIP[side][1] for side in HIP} | dict(body.low_points)
     guards += [

@@ -58,7 +58,7 @@ class Run:
         """The section coordinates of a point, by name."""
         system = self.model.system
         return {
-            name: float(point.states[system.states.index(symbol)])
+            name: float(point.states[system.places[symbol]])
             for name, symbol in system.section.coordinates.items()
         }
 

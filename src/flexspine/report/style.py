@@ -8,13 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ORANGE = "#E69F00"
 SKY = "#56B4E9"
 GREEN = "#009E73"
 BLUE = "#0072B2"
 VERMILION = "#D55E00"
+PURPLE = "#CC79A7"
+YELLOW = "#F0E442"
 
 INK = "#1A1A1A"
 FAINT = "#9A9A9A"
@@ -35,9 +40,26 @@ ENERGY_COLORS = {
 # Arched, straight, sagging: one end is warm and light, the other cold and dark.
 BEND_COLORS = (ORANGE, "#F4F4F4", "#5E3C99")
 
+# Shape and colour of what happens on a branch, by its place in a list of kinds.
+MARKS = (
+    ("D", ORANGE),
+    ("P", GREEN),
+    ("s", SKY),
+    ("o", PURPLE),
+    ("^", YELLOW),
+    ("v", "#B5B5B5"),
+    ("X", INK),
+    ("p", ORANGE),
+    ("h", GREEN),
+    (">", SKY),
+    ("<", PURPLE),
+)
+
 TEXT_SIZE = 9.0  # pt
 SMALL_SIZE = 8.0  # pt
 TITLE_SIZE = 11.0  # pt
+
+LINE = 0.175  # in; from one line of a title to the next
 
 _SETTINGS: dict[str, Any] = {
     "font.family": "sans-serif",
@@ -80,3 +102,16 @@ def themed(changes: dict[str, Any] | None = None) -> Iterator[None]:
         settings: Any = {**_SETTINGS, **(changes or {})}
         mpl.rcParams.update(settings)
         yield
+
+
+def add_title(figure: Figure, heading: str, details: list[str]) -> None:
+    """Write a heading and lines of small type over a figure, which makes room for them."""
+    height = figure.get_size_inches()[1]
+    lines = [(heading, TITLE_SIZE, "bold"), *((line, SMALL_SIZE, "normal") for line in details)]
+    for number, (text, size, weight) in enumerate(lines):
+        figure.text(
+            0.015, 1 - (0.14 + LINE * number + (0.05 if number else 0)) / height, text,
+            fontsize=size, fontweight=weight, va="top", in_layout=False,
+        )  # fmt: skip
+    room = 0.38 + LINE * len(details)
+    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - room / height))

@@ -1,0 +1,279 @@
+"""``flexspine branch``: follow a gait while a quantity or a parameter changes."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flexspine.cli.bound import DEFAULT_PRESET, GaitFile, Preset, refuse_besides_gait
+from flexspine.cli.gait import Symmetric, check_number, numbers, own_gait, own_values
+from flexspine.cli.options import Assignments, Json, assignments
+from flexspine.cli.output import Steps, print_json, steps
+from flexspine.errors import FlexspineError, InputError, ParameterError, UnknownNameError
+
+if TYPE_CHECKING:
+    from flexspine.gaits.family import BranchPoint
+    from flexspine.gaits.gait import Gait
+
+TRACE = "branch.trace.jsonl"
+
+
+def branch(
+    low: Annotated[float, typer.Option("--from", help="Where to stop on the lower side (SI).")],
+    high: Annotated[float, typer.Option("--to", help="Where to stop on the upper side (SI).")],
+    over: Annotated[
+        str,
+        typer.Option(
+            help="What to follow the gait in: mean_speed, energy, an apex coordinate such as "
+            "height, touchdown.fore, touchdown.hind, or a parameter such as spine.stiffness.",
+        ),
+    ] = "mean_speed",
+    gait: GaitFile = None,
+    preset: Preset = None,
+    set_: Assignments = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A quantity to keep, as NAME or NAME=VALUE (default: energy, height and "
+            "mean_speed, without what is followed).",
+        ),
+    ] = None,
+    symmetric: Symmetric = None,
+    longest_step: Annotated[
+        float | None,
+        typer.Option(help="Longest step along the branch, in natural units (default 0.05)."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the branch and a figure into this directory.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Follow a gait both ways until the branch ends or leaves --from to --to.
+
+    It goes around folds, and marks where stability, symmetry or the order of contacts changes.
+    Starts from a saved gait or from that of a preset. With --out, an interrupted branch goes on
+    where it was when the same command is given again. Units are SI and radians. Exit code 0:
+    followed to both ends; 1: no gait to start from; 2: bad input; 3: the machine failed;
+    130: interrupted.
+
+    Examples:
+        flexspine branch --from 3.7 --to 4.6 --out results
+
+        flexspine branch --gait results/gait-1.json --over spine.stiffness --from 200 --to 300
+
+        flexspine branch --over energy --keep height --keep mean_speed=4.4 --from 280 --to 300
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.gaits.continuation import trace_branch
+    from flexspine.gaits.record import branch_record
+    from flexspine.gaits.tracing import LONGEST_STEP
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    step = LONGEST_STEP if longest_step is None else longest_step
+    check_number("--longest-step", step)
+    if step <= 0:
+        raise ParameterError(f"--longest-step = {step:g} is not usable", "give a number above zero")
+    with ExitStack() as stack:
+        progress = stack.enter_context(steps())
+        start = _start(gait, preset, set_, symmetric, progress)
+        begin = _value(start, over)
+        fixed = _kept(start, over, keep)
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        store = None if out is None else out / TRACE
+        resumed = store if store is not None and store.exists() else None
+        try:
+            traced = trace_branch(
+                start,
+                over,
+                bounds=(low, high),
+                fixed=fixed,
+                symmetric=symmetric,
+                longest_step=step,
+                store=store,
+                progress=_Counter(progress, over, (low, high), resumed),
+            )
+            record = branch_record(traced)
+            if directory is not None and store is not None:
+                with directory.stage() as stage:
+                    _write(stage, start, record, progress)
+                store.unlink()
+        except KeyboardInterrupt:
+            if store is not None and store.exists():
+                print(
+                    f"flexspine: what was found is in '{store}'; the same command goes on from it",
+                    file=sys.stderr,
+                )
+            raise
+    if json:
+        print_json(record)
+    else:
+        print(_report(record, f"{over} = {begin:.6g}: {start.family}"))
+        if out is not None:
+            print(f"results in {out}")
+    return 0
+
+
+class _Counter:
+    """Shows how many gaits were found, and which share of the bounds they span."""
+
+    def __init__(
+        self, progress: Steps, over: str, bounds: tuple[float, float], resumed: Path | None
+    ) -> None:
+        self.progress, self.over, self.bounds, self.resumed = progress, over, bounds, resumed
+        self.count, self.seen = 0, (float("inf"), float("-inf"))
+
+    def __call__(self, point: BranchPoint) -> None:
+        if self.resumed is not None and not self.count:
+            print(f"flexspine: going on from '{self.resumed}'", file=sys.stderr)
+        self.count += 1
+        self.seen = (min(self.seen[0], point.value), max(self.seen[1], point.value))
+        self.progress.begin(f"{self.count} gaits, {self.over} = {point.value:.6g}")
+        span = self.bounds[1] - self.bounds[0]
+        self.progress.at((self.seen[1] - self.seen[0]) / span)
+
+
+def _start(
+    file: Path | None,
+    preset: str | None,
+    set_: list[str] | None,
+    symmetric: bool | None,
+    progress: Steps,
+) -> Gait:
+    """The gait to start from. Raises `InputError`, and `FlexspineError` if there is none."""
+    from flexspine.gaits.files import load_gait
+    from flexspine.gaits.search import find_gaits
+    from flexspine.models.presets import load_model
+
+    if file is not None:
+        refuse_besides_gait({"--preset": preset, "--set": set_})
+        saved = load_gait(file)
+        if saved.flaw is not None:
+            raise InputError(
+                f"'{file}' holds no gait: {saved.flaw}", "find one with 'flexspine gait --out'"
+            )
+        return saved
+    name = DEFAULT_PRESET if preset is None else preset
+    model = load_model(name, assignments("--set", set_))
+    own = own_gait(name, "find one with 'flexspine gait --out' and give it with --gait")
+    if model.parameters == own.model.parameters:
+        return own
+    progress.begin("looking for the gait to start from")
+    found = find_gaits(model, own_values(own), symmetric=symmetric, progress=progress.at)
+    if not found.gaits:
+        # No InputError: its exit code is that of a run that ended without its goal.
+        raise FlexspineError(
+            f"'{name}' with these parameters has no gait at the energy, apex height and mean "
+            f"speed of its own ({found.advice})",
+            "find one elsewhere with 'flexspine gait --out' and give it with --gait",
+        )
+    mirrored = [other for other in found if other.symmetric]
+    return min(mirrored or found, key=lambda other: _distance(other, own))
+
+
+def _distance(one: Gait, other: Gait) -> float:
+    """How far two gaits are apart, squared, in natural units."""
+    scales = other.model.scales
+    apart = [(one.model.apex[n] - other.model.apex[n]) / scales[n] for n in one.model.apex]
+    apart += [one.touchdown_angles[n] - other.touchdown_angles[n] for n in one.touchdown_angles]
+    return sum(difference**2 for difference in apart)
+
+
+def _value(start: Gait, over: str) -> float:
+    """The value of a quantity or parameter. Raises `UnknownNameError`."""
+    from flexspine.parameters import values
+
+    known = _quantities(start) | values(start.model.parameters)
+    if over not in known:
+        raise UnknownNameError("quantity or parameter", over, known)
+    return known[over]
+
+
+def _quantities(start: Gait) -> dict[str, float]:
+    """What can be kept, with its value."""
+    angles = {f"touchdown.{side}": angle for side, angle in start.touchdown_angles.items()}
+    return {**own_values(start), **start.model.apex, **angles}
+
+
+def _kept(start: Gait, over: str, keep: list[str] | None) -> dict[str, float] | None:
+    """What is kept, at the value it has unless one is given."""
+    if not keep:
+        return None
+    own = _quantities(start)
+    kept: dict[str, float] = {}
+    for item in keep:
+        if "=" in item:
+            kept |= numbers("--keep", [item])
+        elif item in own:
+            kept[item] = own[item]
+        else:
+            raise UnknownNameError("quantity", item, own)
+    if over in kept:
+        raise InputError(f"{over} is both kept and followed", f"leave --keep {over}")
+    return kept
+
+
+def _write(stage: Path, start: Gait, record: dict[str, Any], progress: Steps) -> None:
+    from flexspine.cli.results import write_json
+    from flexspine.gaits.files import save_gait
+    from flexspine.report.branch_figure import plot_branch
+
+    progress.begin("writing data")
+    save_gait(start, stage / "start.json")
+    write_json(record, stage / "branch.json")
+    _write_csv(record, stage / "branch.csv")
+    progress.begin("drawing")
+    plot_branch(record).savefig(stage / "branch.png")
+
+
+def _write_csv(record: dict[str, Any], path: Path) -> None:
+    """One row per gait; parameters are left out, as only the one followed changes."""
+    rows = [_flat(point) for point in record["points"]]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _flat(point: dict[str, Any]) -> dict[str, Any]:
+    from flexspine.parameters import flattened
+
+    row: dict[str, Any] = {}
+    for name, value in point.items():
+        if name == "floquet_multipliers":
+            for number, (parts, mode) in enumerate(zip(value, point["modes"], strict=True), 1):
+                columns = {"re": parts[0], "im": parts[1], "error": mode["error"]}
+                row |= {f"multiplier_{number}.{part}": x for part, x in columns.items()}
+        elif name == "phases":
+            row[name] = "-".join(value)
+        elif name not in ("parameters", "modes"):
+            row |= flattened({name: value})
+    return row
+
+
+def _report(record: dict[str, Any], start: str) -> str:
+    """The branch in a few lines for a person."""
+    over, points = record["over"], record["points"]
+    along = [point[over] for point in points]
+    kept = ", ".join(f"{name} = {value:.9g}" for name, value in record["fixed"].items())
+    lines = [
+        f"{points[0]['preset']}: {len(points)} {'symmetric' if record['symmetric'] else 'general'} "
+        f"gaits along {over}, from {min(along):.6g} to {max(along):.6g}",
+        f"  kept       {kept}",
+        f"  start      {start}",
+        f"  one end    {record['ends'][0]}",
+        f"  other end  {record['ends'][1]}",
+    ]
+    if record["landmarks"]:
+        lines.append("  landmarks, in order along the branch:")
+        lines += [
+            f"    {mark['value']:<12.8g}  {mark['kind']:<22}{mark['detail']}"
+            for mark in record["landmarks"]
+        ]
+    return "\n".join(lines)

@@ -1,0 +1,286 @@
+"""``flexspine gait``: find the gaits of an animal, with their multipliers."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+from contextlib import ExitStack
+from math import hypot, inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flexspine._version import SCHEMA_VERSION
+from flexspine.cli.bound import DEFAULT_PRESET, Preset
+from flexspine.cli.options import Assignments, Json, assignments
+from flexspine.cli.output import Steps, print_json, steps
+from flexspine.errors import InputError, ParameterError
+
+if TYPE_CHECKING:
+    from flexspine.gaits.gait import Gait
+    from flexspine.models.model import Model
+
+# What a search of an earlier run has left.
+SAVED = re.compile(r"gait-\d+\.(json|png)")
+
+DRAWN_PERIODS = 2
+
+Symmetric = Annotated[
+    bool | None,
+    typer.Option(
+        "--symmetric/--general",
+        help="Only gaits that are their own mirror image in time, or gaits of any shape.",
+    ),
+]
+
+
+def gait(
+    preset: Preset = None,
+    set_: Assignments = None,
+    energy: Annotated[float | None, typer.Option(help="Total energy (J).")] = None,
+    height: Annotated[float | None, typer.Option(help="Height of the CoM at the apex (m).")] = None,
+    speed: Annotated[float | None, typer.Option(help="Mean speed (m/s).")] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Fix another quantity: an apex coordinate, e.g. pitch_rate=0.5 (speed is the "
+            "speed at the apex), touchdown.fore or touchdown.hind.",
+        ),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH",
+            help="Let a parameter be unknown, within bounds, e.g. spine.stiffness=200:300.",
+        ),
+    ] = None,
+    within: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH",
+            help="Look for an unknown within bounds, e.g. touchdown.fore=0.4:0.5.",
+        ),
+    ] = None,
+    symmetric: Symmetric = None,
+    starts: Annotated[
+        int | None,
+        typer.Option(min=1, help="How many random starts, of each kind (default 100)."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the gaits and figures into this directory.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Find all gaits with given energy, apex height and mean speed, and how stable they are.
+
+    What is not given is that of the preset's own gait, before any --set. With --fix nothing is
+    added: exactly what the options name is fixed. Units are SI and radians. Exit code 0: gaits
+    found; 1: none found; 2: bad input; 3: the machine failed; 130: interrupted.
+
+    Examples:
+        flexspine gait --energy 290 --height 0.32 --speed 4.25
+
+        flexspine gait --set spine.stiffness=240 --symmetric --out results
+
+        flexspine gait --energy 290 --fix height=0.32 --fix touchdown.fore=0.46 --json
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.gaits.record import gait_record
+    from flexspine.gaits.search import DEFAULT_STARTS, find_gaits
+    from flexspine.models.presets import load_model
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    name = DEFAULT_PRESET if preset is None else preset
+    model = load_model(name, assignments("--set", set_))
+    fixed = _fixed(name, {"energy": energy, "height": height, "mean_speed": speed}, fix)
+    freed = _freed(model, free)
+    bounds = _ranges("--within", within)
+    with ExitStack() as stack:
+        progress = stack.enter_context(steps())
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        progress.begin("looking for gaits")
+        found = find_gaits(
+            model,
+            fixed,
+            free=freed,
+            symmetric=symmetric,
+            starts=DEFAULT_STARTS if starts is None else starts,
+            seed=seed,
+            bounds=bounds,
+            progress=progress.at,
+        )
+        record = {
+            "schema_version": SCHEMA_VERSION,
+            "preset": model.name,
+            "fixed": fixed,
+            "gaits": [gait_record(gait) for gait in found],
+            "advice": found.advice,
+            "tally": dict(found.tally),
+            "dropped": dict(found.dropped),
+        }
+        if directory is not None:
+            with directory.stage(SAVED) as stage:
+                _write(stage, found.gaits, record, progress)
+    if json:
+        print_json(record)
+    elif record["gaits"]:
+        print(_report(record))
+        if out is not None:
+            print(f"results in {out}")
+    if not record["gaits"]:
+        print(f"flexspine: no gait found: {found.advice}", file=sys.stderr)
+    return 0 if record["gaits"] else 1
+
+
+def own_gait(preset: str, remedy: str) -> Gait:
+    """The gait that a preset starts in. Raises `ParameterError` if it starts in none."""
+    from flexspine.gaits.gait import examine
+    from flexspine.models.presets import load_model
+
+    own = examine(load_model(preset))
+    if own.flaw is not None:
+        raise ParameterError(f"the start of '{preset}' is no gait: {own.flaw}", remedy)
+    return own
+
+
+def own_values(own: Gait) -> dict[str, float]:
+    """What is fixed unless something else is asked for."""
+    return {"energy": own.energy, "height": own.model.apex["height"], "mean_speed": own.mean_speed}
+
+
+def numbers(option: str, given: list[str] | None) -> dict[str, float]:
+    """Parse ``NAME=VALUE`` items whose values have to be numbers. Raises `InputError`."""
+    parsed = assignments(option, given)
+    for name, value in parsed.items():
+        check_number(f"{option} {name}", value)
+    return parsed
+
+
+def check_number(what: str, value: Any) -> None:
+    """Raise `ParameterError` for a text, an infinity and NaN."""
+    from flexspine.parameters import is_number, shortened
+
+    if not (is_number(value) and isfinite(value)):
+        raise ParameterError(f"{what} = {shortened(value)} is not usable", "give a number")
+
+
+def _fixed(preset: str, named: dict[str, float | None], fix: list[str] | None) -> dict[str, float]:
+    """What is fixed: what the options name, else energy, height and mean speed."""
+    given = {name: value for name, value in named.items() if value is not None}
+    more = numbers("--fix", fix)
+    for name in given.keys() & more.keys():
+        raise InputError(f"{name} is given twice", f"leave --fix {name}")
+    if not more and len(given) < len(named):
+        missing = " and ".join(OPTION[name] for name in named if name not in given)
+        given = own_values(own_gait(preset, f"give {missing}")) | given
+    fixed = given | more
+    for name, value in fixed.items():
+        check_number(OPTION.get(name, name), value)
+        if name in FORWARD and value < 0:
+            raise ParameterError(
+                f"{OPTION.get(name, name)} = {value:g} is backward", "give 0 or more"
+            )
+    return fixed
+
+
+OPTION = {"energy": "--energy", "height": "--height", "mean_speed": "--speed"}
+
+FORWARD = ("mean_speed", "speed")
+
+
+def _ranges(option: str, given: list[str] | None) -> dict[str, tuple[float, float]]:
+    """Parse ``NAME=LOW:HIGH`` items."""
+    parsed = {}
+    for item in given or []:
+        name, _, span = item.partition("=")
+        ends = span.split(":")
+        try:
+            low, high = map(float, ends)
+        except ValueError:
+            low, high = inf, -inf
+        if not (name.strip() and -inf < low < high < inf):
+            raise InputError(
+                f"{option} '{item}' is not NAME=LOW:HIGH",
+                f"write {option} NAME=LOW:HIGH, the lower number first",
+            )
+        parsed[name.strip()] = (low, high)
+    return parsed
+
+
+def _freed(model: Model, free: list[str] | None) -> dict[str, tuple[float, float]]:
+    """Parse parameters that are set free, and see that the model takes both bounds."""
+    from flexspine.parameters import values
+
+    ranges = _ranges("--free", free)
+    for name, ends in ranges.items():
+        for end in ends:
+            model.with_values({name: end})
+        if ends[0] <= 0 < values(model.parameters)[name]:
+            raise ParameterError(
+                f"--free {name} from {ends[0]:g} on would let it vanish", "give a LOW above zero"
+            )
+    return ranges
+
+
+def _write(stage: Path, gaits: tuple[Gait, ...], record: dict[str, Any], progress: Steps) -> None:
+    """Write every gait by itself, with a figure, and all of them together."""
+    from flexspine.cli.results import write_json
+    from flexspine.models.dataset import to_dataset
+    from flexspine.models.simulation import simulate
+    from flexspine.report.figure import plot_run
+
+    progress.begin("drawing")
+    write_json(record, stage / "gaits.json")
+    for number, (gait, single) in enumerate(zip(gaits, record["gaits"], strict=True), 1):
+        write_json(single, stage / f"gait-{number}.json")
+        run = simulate(gait.model, strides=DRAWN_PERIODS * gait.strides, tolerance=gait.tolerance)
+        plot_run(to_dataset(run)).savefig(stage / f"gait-{number}.png")
+        progress.at(number / len(gaits))
+
+
+def _report(record: dict[str, Any]) -> str:
+    """The gaits in a table for a person, and below it the multipliers of each."""
+    gaits = record["gaits"]
+    fixed = ", ".join(f"{name} = {value:.9g}" for name, value in record["fixed"].items())
+    lines = [
+        f"{record['preset']}: {len(gaits)} gait{'s' * (len(gaits) > 1)} with {fixed}",
+        "",
+        "     mean speed   peak GRF (N)         spectral",
+        "  #       (m/s)      fore      hind      radius  stable  residual  family",
+    ]
+    for number, gait in enumerate(gaits, 1):
+        peak = gait["peak_grf"]
+        lines.append(
+            f"{number:3}{gait['mean_speed']:12.6f}{peak['fore']:10.3f}{peak['hind']:10.3f}"
+            f"{gait['level_spectral_radius']:12.6f}  {'yes' if gait['stable'] else 'no':<6}"
+            f"{gait['residual']:10.1e}  {gait['family']}"
+            + (", symmetric" if gait["symmetric"] else "")
+        )
+    level = "" if gaits[0]["energy_identity"] is None else " on the energy level"
+    lines += [
+        "",
+        f"The spectral radius is that of the stride map{level}, at fixed touchdown angles.",
+    ]
+    for number, gait in enumerate(gaits, 1):
+        lines += ["", *_multipliers(number, gait)]
+    return "\n".join([*lines, "", record["advice"]])
+
+
+def _multipliers(number: int, gait: dict[str, Any]) -> list[str]:
+    lines = [f"{f'multipliers of gait {number}':<26}magnitude     error  condition  moves most"]
+    for (real, imaginary), mode in zip(gait["floquet_multipliers"], gait["modes"], strict=True):
+        value = f"{real:+.8f}" + (f"{imaginary:+.8f}i" if imaginary else "")
+        lines.append(
+            f"  {value:<24}{hypot(real, imaginary):9.6f}{_number(mode['error'], '.1e'):>10}"
+            f"{_number(mode['condition_number'], '.1f'):>11}  {next(iter(mode['moves']))}"
+        )
+    return lines
+
+
+def _number(value: float | None, form: str) -> str:
+    """A number, or a dash for one that is infinite."""
+    return "-" if value is None else format(value, form)

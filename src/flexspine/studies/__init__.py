@@ -1,0 +1,1 @@
+"""Questions put to many gaits: comparisons, tables, verdicts."""

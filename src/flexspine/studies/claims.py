@@ -1,0 +1,344 @@
+"""The claims of the published study, put to the test with the study's own gaits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from flexspine.gaits.gait import Gait
+from flexspine.studies.spines import LOCKED, RIGID, Specimen, SpineStudy, Sweep
+
+HOLDS, FAILS, DEPENDS = "holds", "fails", "depends on"
+
+# Relative; smaller differences are none.
+NO_DIFFERENCE = 1e-3
+
+# m/s between the speeds at which bodies are compared.
+SPEED_STEP = 0.05
+
+# Relative; a stiff spine whose gait is this close to the locked one's behaves like it.
+ALIKE = 0.01
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the runs say about a claim: ``holds``, ``fails`` or ``depends on``.
+
+    ``finding`` says it in words with the numbers; ``numbers`` are these for machines, ``runs`` the
+    gaits behind it by label and mean speed.
+    """
+
+    number: int
+    claim: str
+    verdict: str
+    finding: str
+    numbers: dict[str, Any] = field(default_factory=dict)
+    runs: tuple[tuple[str, float], ...] = ()
+
+
+def verdicts(study: SpineStudy) -> list[Verdict]:
+    """Judge claims 1 to 7 and 9."""
+    judges = (_peaks, _stiffness, _gain, _stiff_limit, _stability, _oscillation, _shares, _length)
+    return [judge(study) for judge in judges]
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """Ratios of one measure, flexible over baseline, at every common speed and stiffness."""
+
+    baseline: str
+    ratios: tuple[tuple[float, float, float], ...]
+    """Each (stiffness, mean speed, ratio)."""
+
+    @property
+    def lowest(self) -> tuple[float, float, float]:
+        return min(self.ratios, key=lambda item: item[2])
+
+    @property
+    def highest(self) -> tuple[float, float, float]:
+        return max(self.ratios, key=lambda item: item[2])
+
+    @property
+    def below(self) -> int:
+        return sum(ratio < 1 - NO_DIFFERENCE for *_, ratio in self.ratios)
+
+    @property
+    def above(self) -> int:
+        return sum(ratio > 1 + NO_DIFFERENCE for *_, ratio in self.ratios)
+
+    def told(self, what: str) -> str:
+        if not self.ratios:
+            return f"no common speed with the {self.baseline} body"
+        (k0, v0, r0), (k1, v1, r1) = self.lowest, self.highest
+        return (
+            f"{what} over that of the {self.baseline} body: {r0:.3f} (k_t = {k0:g}, {v0:.2f} m/s) "
+            f"to {r1:.3f} (k_t = {k1:g}, {v1:.2f} m/s), lower in {self.below} and higher in "
+            f"{self.above} of {len(self.ratios)} pairs"
+        )
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        return {
+            "pairs": len(self.ratios),
+            "lower": self.below,
+            "higher": self.above,
+            "smallest_ratio": self.lowest[2] if self.ratios else None,
+            "largest_ratio": self.highest[2] if self.ratios else None,
+        }
+
+
+def _speeds(study: SpineStudy) -> list[float]:
+    """The grid of speeds at which bodies are compared."""
+    low, high = study.setting.speeds
+    first = int(np.ceil(low / SPEED_STEP - 1e-9))
+    last = int(np.floor(high / SPEED_STEP + 1e-9))
+    return [round(number * SPEED_STEP, 9) for number in range(first, last + 1)]
+
+
+def _compare(study: SpineStudy, measure: Callable[[Gait], float], baseline: str) -> _Comparison:
+    base = study.specimen(baseline)
+    ratios = []
+    for speed in _speeds(study):
+        reference = base.at(speed)
+        if reference is None:
+            continue
+        for specimen in study.flexible:
+            point = specimen.at(speed)
+            if point is not None:
+                ratio = measure(point.gait) / measure(reference.gait)
+                ratios.append((specimen.stiffness or 0.0, speed, ratio))
+    return _Comparison(baseline, tuple(ratios))
+
+
+def _runs(study: SpineStudy, speeds: Iterable[float]) -> tuple[tuple[str, float], ...]:
+    return tuple(
+        (specimen.label, speed)
+        for speed in speeds
+        for specimen in study.specimens
+        if specimen.at(speed) is not None
+    )
+
+
+def peak(gait: Gait) -> float:
+    """The larger of both legs' peak GRF, in N per pair of legs."""
+    return max(gait.peak_grf.values())
+
+
+def _against_both(
+    study: SpineStudy,
+    number: int,
+    claim: str,
+    what: str,
+    measure: Callable[[Gait], float],
+    *,
+    lower: bool,
+) -> Verdict:
+    """A claim that a measure is always lower (or higher) than that of the rigid body."""
+    pair = [_compare(study, measure, baseline) for baseline in (RIGID, LOCKED)]
+    kept = [(c.below if lower else c.above) for c in pair]
+    broken = [(c.above if lower else c.below) for c in pair]
+    counts = [len(c.ratios) for c in pair]
+    if all(k == n for k, n in zip(kept, counts, strict=True)):
+        verdict = HOLDS
+    elif all(b == n for b, n in zip(broken, counts, strict=True)):
+        verdict = FAILS
+    else:
+        verdict = DEPENDS
+    return Verdict(
+        number,
+        claim,
+        verdict,
+        "; ".join(comparison.told(what) for comparison in pair),
+        {comparison.baseline: comparison.numbers for comparison in pair},
+        _runs(study, study.setting.compared),
+    )
+
+
+def _peaks(study: SpineStudy) -> Verdict:
+    claim = "at equal energy and speed the flexible body's peak GRF is below the rigid body's"
+    return _against_both(study, 1, claim, "peak GRF", peak, lower=True)
+
+
+def _stiffness(study: SpineStudy) -> Verdict:
+    low, high = (study.flexible[i].stiffness for i in (0, -1))
+    claim = f"peak GRF falls as k_t rises from {low:g} to {high:g} N m/rad"
+    falls: list[tuple[float, float, float]] = []
+    rises: list[tuple[float, float, float]] = []
+    for speed in _speeds(study):
+        points = [specimen.at(speed) for specimen in study.flexible]
+        peaks = [peak(point.gait) for point in points if point is not None]
+        if len(peaks) < 2:
+            continue
+        change = peaks[-1] / peaks[0] - 1
+        monotone = all(b < a for a, b in pairwise(peaks))
+        (falls if monotone else rises).append((speed, peaks[0], change))
+    told = []
+    for word, cases in (("falls", falls), ("does not fall throughout", rises)):
+        if cases:
+            speeds = [speed for speed, *_ in cases]
+            changes = [100 * change for *_, change in cases]
+            told.append(
+                f"{word} at {len(cases)} speeds, {min(speeds):.2f} to {max(speeds):.2f} m/s "
+                f"(change {min(changes):.1f} % to {max(changes):.1f} %)"
+            )
+    verdict = HOLDS if falls and not rises else FAILS if rises and not falls else DEPENDS
+    numbers = {"falls_at": [s for s, *_ in falls], "does_not_fall_at": [s for s, *_ in rises]}
+    finding = "; ".join(told) or "fewer than two stiffnesses share a speed"
+    return Verdict(2, claim, verdict, finding, numbers, _runs(study, study.setting.compared))
+
+
+def _near(sweep: Sweep) -> list[tuple[float, float, float]]:
+    """Stiffness, peak GRF and spectral radius of the continued gaits, on the published side.
+
+    The branch over stiffness folds; the published gaits lie on the piece that reaches the stiff
+    end, from its softest point on.
+    """
+    points = list(sweep.branch.points)
+    softest = min(range(len(points)), key=lambda i: points[i].value)
+    return [
+        (point.value, peak(point.gait), point.stability.level_spectral_radius)
+        for point in points[softest:]
+    ]
+
+
+def _gain(study: SpineStudy) -> Verdict:
+    claim = "beyond some k_t there is no further gain"
+    told, numbers, holds = [], {}, []
+    for sweep in study.sweeps:
+        near = _near(sweep)
+        best = min(near, key=lambda item: item[1])
+        end = near[-1]
+        text = f"at {sweep.speed:g} m/s the continued gait bears least, {best[1]:.0f} N, at k_t = "
+        text += f"{best[0]:.0f} N m/rad"
+        text += ", where it ends" if best == end else f", and {end[1]:.0f} N at its stiff end"
+        entry: dict[str, Any] = {"best_stiffness": best[0], "least_peak": best[1]}
+        entry["stiff_end"] = end[0]
+        if sweep.stiff:
+            stiffest, gait, _ = sweep.stiff[0]
+            text += f"; the stiffest spine ({stiffest:.0e} N m/rad) bears {peak(gait):.0f} N"
+            entry["stiffest_peak"] = peak(gait)
+            holds.append(peak(gait) > best[1] * (1 + NO_DIFFERENCE))
+        told.append(text)
+        numbers[f"{sweep.speed:g} m/s"] = entry
+    verdict = HOLDS if holds and all(holds) else FAILS if holds and not any(holds) else DEPENDS
+    return Verdict(
+        3, claim, verdict, "; ".join(told), numbers, _runs(study, study.setting.compared)
+    )
+
+
+def _stiff_limit(study: SpineStudy) -> Verdict:
+    claim = "a very stiff spine behaves like the rigid body"
+    told, numbers = [], {}
+    to_locked: list[float] = []
+    to_rigid: list[float] = []
+    for sweep in study.sweeps:
+        if not sweep.stiff or sweep.locked is None:
+            continue
+        stiffest, gait, _ = sweep.stiff[0]
+        locked = peak(gait) / peak(sweep.locked) - 1
+        to_locked.append(abs(locked))
+        alike = [k for k, g, _ in sweep.stiff if abs(peak(g) / peak(sweep.locked) - 1) < ALIKE]
+        text = (
+            f"at {sweep.speed:g} m/s and k_t = {stiffest:.0e} N m/rad the peak GRF differs from "
+            f"the locked spine's by {100 * locked:+.2g} % (within 1 % from {min(alike):.0f} on)"
+        )
+        rigid = study.specimen(RIGID).at(sweep.speed)
+        if rigid is not None:
+            difference = peak(gait) / peak(rigid.gait) - 1
+            to_rigid.append(abs(difference))
+            text += f", from the published rigid body's by {100 * difference:+.2g} %"
+        told.append(text)
+        numbers[f"{sweep.speed:g} m/s"] = {"to_locked": locked, "within_1_percent_from": min(alike)}
+    alike_locked = bool(to_locked) and max(to_locked) < ALIKE
+    alike_rigid = bool(to_rigid) and max(to_rigid) < ALIKE
+    if not to_locked:
+        verdict, note = DEPENDS, "no speed with a gait of the locked spine"
+    elif alike_locked and alike_rigid:
+        verdict, note = HOLDS, ""
+    elif alike_locked:
+        verdict = DEPENDS
+        note = "; it does behave like its own body with the spine locked, not like the published "
+        note += "rigid one, which has another pitch inertia"
+    else:
+        verdict, note = FAILS, ""
+    return Verdict(
+        4, claim, verdict, "; ".join(told) + note, numbers, _runs(study, study.setting.compared)
+    )
+
+
+def _stability(study: SpineStudy) -> Verdict:
+    claim = "stability is best at moderate k_t"
+    told, numbers = [], {}
+    interior, best_of_all = [], []
+    for sweep in study.sweeps:
+        near = _near(sweep)
+        best = min(near, key=lambda item: item[2])
+        interior.append(near[0][0] < best[0] < near[-1][0])
+        text = f"at {sweep.speed:g} m/s the continued gait is least unstable at k_t = {best[0]:.0f}"
+        text += f" N m/rad (spectral radius on the energy level {best[2]:.3f})"
+        entry: dict[str, Any] = {"best_stiffness": best[0], "level_spectral_radius": best[2]}
+        for baseline in (LOCKED, RIGID):
+            point = study.specimen(baseline).at(sweep.speed)
+            if point is not None:
+                radius = point.stability.level_spectral_radius
+                entry[baseline] = radius
+                text += f", {baseline} {radius:.3f}"
+                best_of_all.append(best[2] < radius)
+        told.append(text)
+        numbers[f"{sweep.speed:g} m/s"] = entry
+    if all(interior) and all(best_of_all) and interior:
+        verdict = HOLDS
+    elif not any(interior) and not any(best_of_all):
+        verdict = FAILS
+    else:
+        verdict = DEPENDS
+    return Verdict(
+        5, claim, verdict, "; ".join(told), numbers, _runs(study, study.setting.compared)
+    )
+
+
+def _oscillation(study: SpineStudy) -> Verdict:
+    claim = "the flexible body's CoM oscillates less"
+    what = "CoM amplitude (highest minus lowest)"
+    return _against_both(study, 6, claim, what, lambda gait: gait.com_amplitude, lower=True)
+
+
+def _shares(study: SpineStudy) -> Verdict:
+    claim = "the spine stores energy and lowers the gravitational share at the apex"
+    speed = study.setting.compared[-1]
+    told, numbers = [], {}
+    stores = []
+    specimen: Specimen
+    for specimen in study.specimens:
+        point = specimen.at(speed)
+        if point is None:
+            continue
+        shares = point.gait.apex_energy_shares
+        numbers[specimen.label] = shares
+        if specimen.stiffness is not None:
+            stores.append(shares["spine"])
+        told.append(
+            f"{specimen.label}: gravity {100 * shares['gravity']:.2f} %, spine "
+            f"{100 * shares['spine']:.2f} %, kinetic {100 * shares['kinetic']:.2f} %"
+        )
+    note = (
+        "; the spine stores energy, but at equal energy and apex height the gravitational share is "
+        "fixed by the setting, whatever the spine: what it holds comes from the kinetic share"
+    )
+    stored = bool(stores) and min(stores) > NO_DIFFERENCE
+    verdict = DEPENDS if stored else FAILS
+    return Verdict(
+        7, claim, verdict, f"at {speed:g} m/s, at the apex: {'; '.join(told)}{note * stored}",
+        numbers, _runs(study, [speed]),
+    )  # fmt: skip
+
+
+def _length(study: SpineStudy) -> Verdict:
+    claim = "a flexible spine lengthens the stride"
+    return _against_both(
+        study, 9, claim, "stride length", lambda gait: gait.stride_length, lower=False
+    )
