@@ -7,8 +7,8 @@ OUT ?= results
 .PHONY: run test bench pictures clean
 
 run: $(VENV)/.installed
-	$(BIN)/flexspine bound --strides 4 --out $(OUT)
-	@echo "Look at $(OUT)/figure.png, $(OUT)/strip.png and $(OUT)/animation.mp4"
+	$(BIN)/flexspine study --out $(OUT)
+	@echo "Look at $(OUT)/verdicts.md and $(OUT)/peak_grf_over_speed.png"
 
 test: $(VENV)/.installed-dev
 	$(BIN)/ruff check src tests benchmarks
@@ -23,8 +23,10 @@ bench: $(VENV)/.installed-dev
 # The pictures of the README.
 pictures: $(VENV)/.installed
 	$(BIN)/flexspine bound --strides 2 --out $(OUT)/pictures
+	$(BIN)/flexspine study --out $(OUT)/pictures/study
 	mkdir -p docs/images
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
+	cp $(OUT)/pictures/study/peak_grf_over_speed.png docs/images/
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

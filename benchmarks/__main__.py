@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -21,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import hand_field, scipy_peer
+from benchmarks.gait_benchmark import gait_benchmark
 from flexspine import load_model
 from flexspine.hybrid.integrate import integrate
 
@@ -159,6 +161,31 @@ def start_benchmark() -> dict[str, float]:
     return {name: wall(arguments) for name, arguments in commands.items()}
 
 
+def print_gaits(console: Console, gaits: dict[str, Any]) -> None:
+    table = Table(
+        title=f"{gaits['gaits']} symmetric gaits over speed (k_t = 260 N m/rad), per gait"
+    )
+    for heading in ("SciPy peer", "multipliers", "peer ms", "ms", "times faster", "residuals"):
+        table.add_column(heading, justify="left" if heading == "SciPy peer" else "right")
+    for row in gaits["rows"]:
+        table.add_row(
+            row["peer"],
+            "yes" if row["multipliers"] else "no",
+            f"{row['peer_ms']:.1f}",
+            f"{row['flexspine_ms']:.2f}",
+            f"{row['ratio']:.0f}",
+            f"{row['peer_residual']:.0e}, {row['flexspine_residual']:.0e}",
+        )
+    console.print(table)
+    whole = gaits["branches"]
+    console.print(
+        f"Branches of four stiffnesses and both baselines: {whole['gaits']} gaits with multipliers "
+        f"in {whole['s']:.1f} s"
+    )
+    for kind, search in gaits["search_100_starts"].items():
+        console.print(f"Search, {kind}, 100 starts: {search['gaits']} gaits in {search['s']:.2f} s")
+
+
 def main() -> None:
     console = Console()
     strides = stride_benchmark()
@@ -182,13 +209,17 @@ def main() -> None:
         f"{field['cost_ratio']:.2f} (0.05 s of double stance, results differ by "
         f"{field['largest_difference']:.0e})"
     )
+    gaits = gait_benchmark()
+    print_gaits(console, gaits)
     starts = start_benchmark()
     for name, wall in starts.items():
         console.print(f"{name:<26}{wall:.2f} s")
     out = Path("results/benchmarks.json")
     out.parent.mkdir(exist_ok=True)
     record = {"machine": platform.processor() or platform.machine(), "stride": strides}
-    out.write_text(json.dumps({**record, "field": field, "start": starts}, indent=2) + "\n")
+    out.write_text(
+        json.dumps({**record, "field": field, "gaits": gaits, "start": starts}, indent=2) + "\n"
+    )
     console.print(f"written to {out}")
 
 

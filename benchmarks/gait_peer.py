@@ -1,12 +1,14 @@
-"""The fair peer of the gait search: symmetric gaits of the published flexible body with SciPy.
+"""The fair peers of the gait search: symmetric gaits of the published flexible body with SciPy.
 
 The field is that of `scipy_peer`, integrated by DOP853 with terminal events; `scipy.optimize.root`
-(hybr) solves the three half-stride equations. Their Jacobian and the multipliers come from the
-variational equations, written by hand: one pass at a loose tolerance costs less than one half
-stride, where central differences good to 1e-6 take fourteen. Time is saved wherever a careful user
-could save it: one guard per phase, the rise to the apex without any (its length is known), nothing
-evaluated twice, and the multipliers from half a stride. The other half is the first one run
-backwards and mirrored, with the leg's lift-off angle held fixed in place of its touchdown angle.
+(hybr) solves the three half-stride equations, a full stride confirms the gait. Two peers:
+
+- `differences`: hybr makes its own Jacobian, multipliers are central differences of full strides.
+  What a careful user writes in an afternoon.
+- `tangents`: Jacobian and multipliers from variational equations written and simplified by hand for
+  this body and these phases, one guard a phase, the rise to the apex without any, nothing
+  evaluated twice, and the multipliers from half a stride, as the other half is the first one run
+  backwards and mirrored with the lift-off angle held fixed. The most that SciPy can do here.
 
 Setting: k_t = 260 N m/rad, 290 J, apex at 0.32 m, the fore leg lands first.
 """
@@ -42,6 +44,8 @@ ENERGY, HEIGHT = 290.0, 0.32
 TOLERANCE = 5e-13  # leaves a residual of about 1e-11 after a stride
 TANGENT_TOLERANCE = 1e-7  # leaves errors of about 1e-7 in the multipliers
 STEP = 1e-10  # the xtol of hybr; larger ones leave residuals of 1e-10
+SHIFT = 1e-5  # central differences with it leave errors of about 1e-7 in the multipliers
+PEERS = ("differences", "tangents")
 CONFIRMED = 1e-9  # the largest residual after a stride that passes for a gait
 
 FLIGHT = scalar_field({})
@@ -239,7 +243,22 @@ def stride_multipliers(tangent: Tangent) -> Any:
     return np.linalg.eigvals(MIRROR @ np.linalg.solve(back, MIRROR @ first))
 
 
-def gait(speed: float, guess: Sequence[float], multipliers: bool = True) -> tuple[Gait, Any | None]:
+def differenced_multipliers(start: Any, angles: dict[str, float]) -> Any:
+    """Eigenvalues of the stride map by central differences of full strides."""
+    jacobian = np.zeros((6, 6))
+    for column, place in enumerate(SECTION):
+        ends = []
+        for sign in (1, -1):
+            moved = start.copy()
+            moved[place] += sign * SHIFT
+            ends.append(stride("DOP853", TOLERANCE, start=moved, angles=angles)[1][SECTION])
+        jacobian[:, column] = (ends[0] - ends[1]) / (2 * SHIFT)
+    return np.linalg.eigvals(jacobian)
+
+
+def gait(
+    speed: float, guess: Sequence[float], multipliers: bool = True, peer: str = "tangents"
+) -> tuple[Gait, Any | None]:
     """The gait of this mean speed near a guess of (pitch, pitch rate, fore angle)."""
     halves: dict[bytes, Half] = {}
 
@@ -277,7 +296,8 @@ def gait(speed: float, guess: Sequence[float], multipliers: bool = True) -> tupl
         slopes[key] = np.array([p + q, wp - wq, mean]) @ directions
         return slopes[key]
 
-    found = root(equations, guess, jac=jacobian, method="hybr", options={"xtol": STEP})
+    slope = jacobian if peer == "tangents" else None
+    found = root(equations, guess, jac=slope, method="hybr", options={"xtol": STEP})
     if not found.success:
         raise ValueError(found.message)
     pitch, rate, angle = found.x.tolist()
@@ -288,11 +308,18 @@ def gait(speed: float, guess: Sequence[float], multipliers: bool = True) -> tupl
     if residual > CONFIRMED:
         raise ValueError(f"the stride does not repeat: {residual:.1e}")
     out = Gait(pitch, rate, angle, run.liftoff, float(run.start[4]), residual)
-    return out, stride_multipliers(half_tangent(run, angle)) if multipliers else None
+    if not multipliers:
+        return out, None
+    if peer == "differences":
+        return out, differenced_multipliers(run.start, angles)
+    return out, stride_multipliers(half_tangent(run, angle))
 
 
 def branch(
-    speeds: Iterable[float], start_guess: Sequence[float], multipliers: bool = True
+    speeds: Iterable[float],
+    start_guess: Sequence[float],
+    multipliers: bool = True,
+    peer: str = "tangents",
 ) -> list[tuple[Gait, Any | None]]:
     """The gaits of these mean speeds in turn, each predicted by the secant of the last two."""
     out: list[tuple[Gait, Any | None]] = []
@@ -302,6 +329,6 @@ def branch(
         if len(known) > 1:
             (s0, u0), (s1, u1) = known[-2:]
             guess += (speed - s1) / (s1 - s0) * (u1 - u0)
-        out.append(gait(speed, guess, multipliers))
+        out.append(gait(speed, guess, multipliers, peer))
         known.append((speed, np.array(out[-1][0][:3])))
     return out

@@ -12,9 +12,11 @@ from flexspine._version import __version__
 if TYPE_CHECKING:
     from flexspine.errors import FlexspineError, InputError, MachineError
     from flexspine.gaits.continuation import Branch, trace_branch
+    from flexspine.gaits.files import load_gait, save_gait
     from flexspine.gaits.gait import Gait, examine
     from flexspine.gaits.landmarks import Landmark
     from flexspine.gaits.measures import summarize
+    from flexspine.gaits.return_map import ReturnMap, stride_map
     from flexspine.gaits.search import Search, find_gaits
     from flexspine.gaits.stability import Stability, floquet_multipliers
     from flexspine.gaits.switching import switch_branch
@@ -33,6 +35,7 @@ _HOMES = {
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
     "Model": "models.model",
+    "ReturnMap": "gaits.return_map",
     "Run": "models.simulation",
     "Search": "gaits.search",
     "Stability": "gaits.stability",
@@ -40,10 +43,13 @@ _HOMES = {
     "examine": "gaits.gait",
     "find_gaits": "gaits.search",
     "floquet_multipliers": "gaits.stability",
+    "load_gait": "gaits.files",
     "load_model": "models.presets",
     "plot_run": "report.figure",
     "preset_names": "models.presets",
+    "save_gait": "gaits.files",
     "simulate": "models.simulation",
+    "stride_map": "gaits.return_map",
     "strip": "report.animation",
     "summarize": "gaits.measures",
     "switch_branch": "gaits.switching",
@@ -59,6 +65,7 @@ __all__ = [
     "Landmark",
     "MachineError",
     "Model",
+    "ReturnMap",
     "Run",
     "Search",
     "Stability",
@@ -67,10 +74,13 @@ __all__ = [
     "examine",
     "find_gaits",
     "floquet_multipliers",
+    "load_gait",
     "load_model",
     "plot_run",
     "preset_names",
+    "save_gait",
     "simulate",
+    "stride_map",
     "strip",
     "summarize",
     "switch_branch",

@@ -100,3 +100,50 @@ def test_a_full_disk_is_exit_code_3_and_keeps_older_results(
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in kept.parent.iterdir()] == ["summary.json"]
     assert kept.read_text() == "older"
+
+
+def test_the_study_writes_tables_figures_and_verdicts(cli: Cli, tmp_path: Path) -> None:
+    """In small: one stiffness, one speed for the sweeps."""
+    small = ("--stiffness", "260", "--compare", "4.5", "--speeds", "4.3:4.7")
+    result = cli("study", *small, "--out", "results", "--json")
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == ""
+    record = json.loads(result.stdout)
+    assert [verdict["claim"] for verdict in record["verdicts"]] == [1, 2, 3, 4, 5, 6, 7, 9]
+    out = tmp_path / "results"
+    for name in ("gaits", "stiffness", "landmarks"):
+        assert (out / f"{name}.csv").stat().st_size > 0
+        assert (out / f"{name}.parquet").stat().st_size > 0
+    assert {path.name for path in out.glob("*.png")} == {
+        "energy_shares.png",
+        "peak_grf_over_speed.png",
+        "peak_grf_over_stiffness.png",
+        "profiles.png",
+        "stability_over_speed.png",
+        "stability_over_stiffness.png",
+    }
+    assert not [path for path in out.iterdir() if path.is_dir()]
+    for verdict in record["verdicts"]:
+        for run in verdict["runs"]:
+            assert (out / run["gait"]).exists()
+    again = cli("bound", "--gait", out / record["verdicts"][0]["runs"][0]["gait"], "--json")
+    assert json.loads(again.stdout)["mean_speed"] == pytest.approx(4.5, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--speeds", "4.6:4.2"), "--speeds"),
+        (("--speeds", "fast"), "--speeds"),
+        (("--energy", "500"), "energy"),
+        (("--stiffness", "1e5"), "k_t"),
+    ],
+)
+def test_a_study_without_gaits_to_compare_is_refused(
+    cli: Cli, tmp_path: Path, arguments: tuple[str, str], named: str
+) -> None:
+    result = cli("study", *arguments, "--out", "results")
+    assert result.returncode == 2
+    assert named in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "results").exists()

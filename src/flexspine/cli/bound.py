@@ -9,22 +9,18 @@ from typing import Annotated, Any
 
 import typer
 
-from flexspine.cli.options import Apex, Assignments, Json, Touchdown, assignments
+from flexspine.cli.options import (
+    DEFAULT_PRESET,
+    Apex,
+    Assignments,
+    GaitFile,
+    Json,
+    Preset,
+    Touchdown,
+    assignments,
+)
 from flexspine.cli.output import print_json, steps
 from flexspine.errors import InputError
-
-DEFAULT_PRESET = "kamimura2015-flexible"
-
-Preset = Annotated[
-    str | None,
-    typer.Option(
-        help=f"A preset (see 'flexspine presets') or a TOML file (default {DEFAULT_PRESET})."
-    ),
-]
-GaitFile = Annotated[
-    Path | None,
-    typer.Option("--gait", metavar="FILE", help="A gait saved by 'flexspine gait --out'."),
-]
 
 
 def bound(

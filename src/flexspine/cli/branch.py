@@ -11,9 +11,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine.cli.bound import DEFAULT_PRESET, GaitFile, Preset, refuse_besides_gait
-from flexspine.cli.gait import Symmetric, check_number, numbers, own_gait, own_values
-from flexspine.cli.options import Assignments, Json, assignments
+from flexspine.cli.bound import refuse_besides_gait
+from flexspine.cli.gait import own_gait
+from flexspine.cli.options import (
+    DEFAULT_PRESET,
+    Assignments,
+    GaitFile,
+    Json,
+    Preset,
+    Symmetric,
+    assignments,
+    check_number,
+    numbers,
+)
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.errors import FlexspineError, InputError, ParameterError, UnknownNameError
 
@@ -165,7 +175,7 @@ def _start(
     if model.parameters == own.model.parameters:
         return own
     progress.begin("looking for the gait to start from")
-    found = find_gaits(model, own_values(own), symmetric=symmetric, progress=progress.at)
+    found = find_gaits(model, own.quantities, symmetric=symmetric, progress=progress.at)
     if not found.gaits:
         # No InputError: its exit code is that of a run that ended without its goal.
         raise FlexspineError(
@@ -198,7 +208,7 @@ def _value(start: Gait, over: str) -> float:
 def _quantities(start: Gait) -> dict[str, float]:
     """What can be kept, with its value."""
     angles = {f"touchdown.{side}": angle for side, angle in start.touchdown_angles.items()}
-    return {**own_values(start), **start.model.apex, **angles}
+    return {**start.quantities, **start.model.apex, **angles}
 
 
 def _kept(start: Gait, over: str, keep: list[str] | None) -> dict[str, float] | None:

@@ -6,15 +6,24 @@ import re
 import signal
 import sys
 from contextlib import ExitStack
-from math import hypot, inf, isfinite
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from flexspine._version import SCHEMA_VERSION
-from flexspine.cli.bound import DEFAULT_PRESET, Preset
-from flexspine.cli.options import Assignments, Json, assignments
+from flexspine.cli.options import (
+    DEFAULT_PRESET,
+    Assignments,
+    Json,
+    Preset,
+    Symmetric,
+    assignments,
+    check_number,
+    numbers,
+    span,
+)
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.errors import InputError, ParameterError
 
@@ -26,14 +35,6 @@ if TYPE_CHECKING:
 SAVED = re.compile(r"gait-\d+\.(json|png)")
 
 DRAWN_PERIODS = 2
-
-Symmetric = Annotated[
-    bool | None,
-    typer.Option(
-        "--symmetric/--general",
-        help="Only gaits that are their own mirror image in time, or gaits of any shape.",
-    ),
-]
 
 
 def gait(
@@ -147,27 +148,6 @@ def own_gait(preset: str, remedy: str) -> Gait:
     return own
 
 
-def own_values(own: Gait) -> dict[str, float]:
-    """What is fixed unless something else is asked for."""
-    return {"energy": own.energy, "height": own.model.apex["height"], "mean_speed": own.mean_speed}
-
-
-def numbers(option: str, given: list[str] | None) -> dict[str, float]:
-    """Parse ``NAME=VALUE`` items whose values have to be numbers. Raises `InputError`."""
-    parsed = assignments(option, given)
-    for name, value in parsed.items():
-        check_number(f"{option} {name}", value)
-    return parsed
-
-
-def check_number(what: str, value: Any) -> None:
-    """Raise `ParameterError` for a text, an infinity and NaN."""
-    from flexspine.parameters import is_number, shortened
-
-    if not (is_number(value) and isfinite(value)):
-        raise ParameterError(f"{what} = {shortened(value)} is not usable", "give a number")
-
-
 def _fixed(preset: str, named: dict[str, float | None], fix: list[str] | None) -> dict[str, float]:
     """What is fixed: what the options name, else energy, height and mean speed."""
     given = {name: value for name, value in named.items() if value is not None}
@@ -176,7 +156,7 @@ def _fixed(preset: str, named: dict[str, float | None], fix: list[str] | None) -
         raise InputError(f"{name} is given twice", f"leave --fix {name}")
     if not more and len(given) < len(named):
         missing = " and ".join(OPTION[name] for name in named if name not in given)
-        given = own_values(own_gait(preset, f"give {missing}")) | given
+        given = own_gait(preset, f"give {missing}").quantities | given
     fixed = given | more
     for name, value in fixed.items():
         check_number(OPTION.get(name, name), value)
@@ -194,21 +174,8 @@ FORWARD = ("mean_speed", "speed")
 
 def _ranges(option: str, given: list[str] | None) -> dict[str, tuple[float, float]]:
     """Parse ``NAME=LOW:HIGH`` items."""
-    parsed = {}
-    for item in given or []:
-        name, _, span = item.partition("=")
-        ends = span.split(":")
-        try:
-            low, high = map(float, ends)
-        except ValueError:
-            low, high = inf, -inf
-        if not (name.strip() and -inf < low < high < inf):
-            raise InputError(
-                f"{option} '{item}' is not NAME=LOW:HIGH",
-                f"write {option} NAME=LOW:HIGH, the lower number first",
-            )
-        parsed[name.strip()] = (low, high)
-    return parsed
+    pairs = (item.partition("=")[::2] for item in given or [])
+    return {name.strip(): span(f"{option} {name.strip()}", ends) for name, ends in pairs}
 
 
 def _freed(model: Model, free: list[str] | None) -> dict[str, tuple[float, float]]:

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from flexspine.errors import InputError
+from flexspine.errors import InputError, ParameterError
 
+DEFAULT_PRESET = "kamimura2015-flexible"
+
+Preset = Annotated[
+    str | None,
+    typer.Option(
+        help=f"A preset (see 'flexspine presets') or a TOML file (default {DEFAULT_PRESET})."
+    ),
+]
+GaitFile = Annotated[
+    Path | None,
+    typer.Option("--gait", metavar="FILE", help="A gait saved by 'flexspine gait --out'."),
+]
+Symmetric = Annotated[
+    bool | None,
+    typer.Option(
+        "--symmetric/--general",
+        help="Only gaits that are their own mirror image in time, or gaits of any shape.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Assignments = Annotated[
     list[str] | None,
@@ -36,6 +57,35 @@ def assignments(option: str, given: list[str] | None) -> dict[str, Any]:
             raise InputError(f"{option} '{item}' is not NAME=VALUE", f"write {option} NAME=VALUE")
         parsed[name.strip()] = _number(value.strip())
     return parsed
+
+
+def numbers(option: str, given: list[str] | None) -> dict[str, float]:
+    """Parse ``NAME=VALUE`` items whose values have to be numbers. Raises `InputError`."""
+    parsed = assignments(option, given)
+    for name, value in parsed.items():
+        check_number(f"{option} {name}", value)
+    return parsed
+
+
+def check_number(what: str, value: Any) -> None:
+    """Raise `ParameterError` for a text, an infinity and NaN."""
+    from flexspine.parameters import is_number, shortened
+
+    if not (is_number(value) and isfinite(value)):
+        raise ParameterError(f"{what} = {shortened(value)} is not usable", "give a number")
+
+
+def span(option: str, text: str) -> tuple[float, float]:
+    """Parse ``LOW:HIGH``."""
+    try:
+        low, high = map(float, text.split(":"))
+    except ValueError:
+        low, high = inf, -inf
+    if not -inf < low < high < inf:
+        raise InputError(
+            f"{option} '{text}' is not LOW:HIGH", "write two numbers, the lower one first"
+        )
+    return low, high
 
 
 def _number(text: str) -> float | str:

@@ -19,6 +19,8 @@ from flexspine.gaits.landmarks import Landmark
 from flexspine.gaits.newton import Attempt
 from flexspine.gaits.tracing import Tracing
 
+KEYS = {"way", "points", "marks", "step", "end"}
+
 
 class Checkpoint:
     """The file of one branch; opening it reads what is there. Raises `OutputError`."""
@@ -33,13 +35,13 @@ class Checkpoint:
             path.write_text(json.dumps(header) + "\n", encoding="utf-8")
 
     def _read(self, header: dict[str, Any]) -> None:
-        text = self.path.read_text(encoding="utf-8")
-        whole, _, rest = text.rpartition("\n")
+        rest = ""
         try:
+            whole, _, rest = self.path.read_text(encoding="utf-8").rpartition("\n")
             first, *lines = [json.loads(line) for line in whole.splitlines()] or [None]
         except ValueError:
             first, lines = None, []
-        if first != header:
+        if first != header or not all(line.keys() >= KEYS for line in lines):
             raise OutputError(
                 f"'{self.path}' holds a branch that was traced with other settings",
                 "give another place, or delete it to begin anew",

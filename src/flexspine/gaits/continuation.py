@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from flexspine._version import __version__
-from flexspine.errors import ParameterError
+from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.gaits.checkpoint import Checkpoint
 from flexspine.gaits.family import BranchPoint, Family
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.landmarks import Landmark, Segment
-from flexspine.gaits.problem import Problem
-from flexspine.gaits.tracing import LONGEST_STEP, Tracer, Tracing, land
+from flexspine.gaits.problem import ANGLES, Problem
+from flexspine.gaits.tracing import CLOSED_BRANCH, LONGEST_STEP, Tracer, Tracing, land
 from flexspine.parameters import values
 
 MOST_POINTS = 2000
@@ -76,7 +76,8 @@ def trace_branch(
 
     ``over`` is ``mean_speed``, ``energy``, an apex coordinate, ``touchdown.fore`` or ``.hind``, or
     a parameter by its dotted name. ``fixed`` are the quantities kept, by default the gait's
-    energy, apex height and mean speed without ``over``. ``symmetric`` follows symmetric gaits only
+    energy, apex height and mean speed without ``over``, or, for another apex coordinate or a
+    touchdown angle, energy and height. ``symmetric`` follows symmetric gaits only
     (by default if the gait is one). ``store`` is a file that keeps every step; traced again with
     the same arguments, the branch goes on from there. SI and radians. Raises `UnknownNameError`,
     `ParameterError`, `OutputError`.
@@ -88,10 +89,12 @@ def trace_branch(
     if store is not None:
         settings = {"bounds": bounds, "longest_step": longest_step, "most_points": most_points}
         checkpoint = Checkpoint(store, {**_description(family, gait), **settings})
-    halves = []
+    halves: list[Tracing] = []
     for way in (-1, 1):
         tracing = Tracing((start if way > 0 else start.turned(),))
-        if checkpoint is not None:
+        if halves and halves[0].end == CLOSED_BRANCH:
+            tracing = replace(tracing, end=CLOSED_BRANCH)
+        elif checkpoint is not None:
             tracing = checkpoint.resume(way, family, tracing)
         for state in tracer.go(tracing):
             if checkpoint is not None:
@@ -124,12 +127,16 @@ def family_of(
     gait: Gait, over: str, fixed: Mapping[str, float] | None, symmetric: bool | None
 ) -> Family:
     """The family that a gait belongs to. Raises `UnknownNameError` and `ParameterError`."""
-    own = {"energy": gait.energy, "height": gait.model.apex["height"]}
-    own["mean_speed"] = gait.mean_speed
+    known = {*gait.model.apex, *ANGLES, "mean_speed", "energy"}
+    parameters = gait.model.parameter_names[: -len(ANGLES)]
+    if over not in known and over not in parameters:
+        raise UnknownNameError("quantity or parameter", over, {*known, *parameters})
+    own = gait.quantities
+    if over not in (*own, *parameters):
+        del own["mean_speed"]
     kept = {
         name: value for name, value in (own if fixed is None else fixed).items() if name != over
     }
-    known = {*gait.model.apex, "touchdown.fore", "touchdown.hind", "mean_speed", "energy"}
     free = () if over in known else (over,)
     mirrored = gait.symmetric if symmetric is None else symmetric
     problem = Problem(

@@ -84,14 +84,17 @@ class Gait:
         return self.trajectory.modes
 
     @cached_property
-    def contacts(self) -> tuple[str, ...]:
-        """Touchdowns and lift-offs in order."""
-        return tuple(
-            name
-            for event in self.trajectory.events
-            for name in event.names
-            if name.endswith(("touchdown", "lift-off"))
-        )
+    def contacts(self) -> tuple[tuple[str, ...], ...]:
+        """Touchdowns and lift-offs in order, those at one instant together."""
+        groups: list[list[str]] = []
+        latest = -1.0
+        for name, time in contact_times(self.trajectory):
+            if time - latest < ONE_INSTANT:
+                groups[-1].append(name)
+            else:
+                groups.append([name])
+            latest = time
+        return tuple(tuple(sorted(group)) for group in groups)
 
     @property
     def touchdown_angles(self) -> dict[str, float]:
@@ -137,6 +140,12 @@ class Gait:
         quantities = section_quantities(self.model.system)
         answer = quantities(start.states, start.held, self.model.parameter_vector)
         return float(answer.values[list(self.model.system.section.quantities).index("energy")])
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """Energy (J), apex height (m) and mean speed (m/s): what tells gaits of an animal apart."""
+        height = self.model.apex["height"]
+        return {"energy": self.energy, "height": height, "mean_speed": self.mean_speed}
 
     @property
     def peak_grf(self) -> dict[str, float]:
@@ -191,23 +200,38 @@ class Gait:
         return np.array([[apex[n] / self.model.scales[n] for n in apex] for apex in self._tops()])
 
     def _tops(self) -> list[dict[str, float]]:
-        """Every point at which the CoM is highest in flight, section or not."""
-        run, found = self.run, []
-        climb = run.model.state_names.index("com_y_rate")
-        for arc in run.trajectory.arcs:
-            states = arc(arc.times)
-            rates = states[:, climb]
-            if arc.mode != "DF" or not rates[0] >= 0 >= rates[-1]:
-                continue
-            # Flight is a parabola: the climb rate falls evenly.
-            share = rates[0] / (rates[0] - rates[-1])
-            top = arc(np.array([arc.start + share * (arc.end - arc.start)]))[0]
-            found.append(run.section_state(run.trajectory.end._replace(states=top)))
-        return found
+        """Every point at which the CoM is highest in flight, section or not.
 
+        The apex is a guard, so an arc of flight begins at each of them.
+        """
+        run = self.run
+        climb = run.model.state_names.index("com_y_rate")
+        starts = [arc(arc.times[:1])[0] for arc in run.trajectory.arcs if arc.mode == "DF"]
+        return [
+            run.section_state(run.trajectory.end._replace(states=states))
+            for states in starts
+            if abs(states[climb]) < AT_REST
+        ]
+
+
+# s; contacts closer than this come in either order by rounding.
+ONE_INSTANT = 1e-10
+
+# m/s; the CoM rests at an apex, to rounding error.
+AT_REST = 1e-9
 
 # rad, and relative for forces; gaits are known to 1e-11.
 SYMMETRY = 1e-7
+
+
+def contact_times(trajectory: Trajectory) -> list[tuple[str, float]]:
+    """Touchdowns and lift-offs of a run with their times in s."""
+    return [
+        (name, event.time)
+        for event in trajectory.events
+        for name in event.names
+        if name.endswith(("touchdown", "lift-off"))
+    ]
 
 
 def examine(model: Model, *, strides: int = 1, tolerance: float = DEFAULT_TOLERANCE) -> Gait:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,14 +19,18 @@ from flexspine.gaits.family import (
     Family,
     Refuted,
 )
-from flexspine.gaits.gait import Gait
+from flexspine.gaits.gait import Gait, contact_times
 from flexspine.gaits.newton import Slice
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import GRAZED
 from flexspine.hybrid.trajectory import Trajectory
 
-# Natural units along the branch; what happens is located to this.
+# Natural units along the branch; what happens is located to this. A change of contacts is known to
+# 1e-6 only: next to it half a stride is half done within no time, and there is no solving for it.
 LOCATED = 1e-9
+
+# Where an interval is cut in turn: at the very place that is looked for there may be no solution.
+SHARES = (0.5, 0.35, 0.65)
 
 # How far from the unit circle a multiplier may be found that is said to cross it; a test function
 # also vanishes where two real multipliers are reciprocal.
@@ -34,6 +39,9 @@ ON_CIRCLE = 1e-4
 SYMMETRY_BREAKING, CONTACTS = "symmetry breaking", "contact order"
 SECOND_TOUCHDOWN, REFUTED = "second touchdown", "not a gait"
 GRAZING, NO_FLIGHT = "grazing", "no flight at the apex"
+
+# Natural units; how far beyond a tear to look.
+BEYOND = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 
 # s; over the shortest step of a branch no event moves by as much, unless the motion is torn.
 TORN = 1e-3
@@ -49,7 +57,8 @@ class Landmark:
     ``kind`` is ``fold``, ``branch point``, ``symmetry breaking``, ``period doubling``,
     ``Neimark-Sacker``, ``multiplier +1``, ``contact order``, ``second touchdown``, ``grazing``,
     ``no flight at the apex`` or ``not a gait``; ``detail`` says it in words. ``at`` is the last
-    point of the branch up to it, a gait to within 1e-9 of the place in natural units.
+    point of the branch up to it, in natural units a gait to within 1e-9 of the place (1e-6 for
+    ``contact order``).
     """
 
     kind: str
@@ -117,8 +126,9 @@ class Segment:
         low, high = 0.0, self.length
         before, after = self.first, self.last
         while high - low > LOCATED:
-            middle = (low + high) / 2
-            point = self.at(middle)
+            inner = ((low + share * (high - low)) for share in SHARES)
+            found = ((middle, point) for middle in inner if (point := self.at(middle)) is not None)
+            middle, point = next(found, (low, None))
             if point is None:
                 break
             if still(point):
@@ -147,13 +157,15 @@ def _change(before: Gait, after: Gait) -> str:
     if before.phases != after.phases:
         return f"{'-'.join(before.phases)} becomes {'-'.join(after.phases)}"
     for side in after.touchdown_angles:
-        more = after.contacts.count(f"{side} touchdown") - before.contacts.count(
-            f"{side} touchdown"
-        )
-        if more:
+        landings = [_landings(gait, side) for gait in (before, after)]
+        if more := landings[1] - landings[0]:
             begins = "begins" if more > 0 else "ceases"
             return f"the {side} leg {begins} to touch the ground without bearing load"
     return "the order of simultaneous contacts changes"
+
+
+def _landings(gait: Gait, side: str) -> int:
+    return sum(f"{side} touchdown" in names for names in gait.contacts)
 
 
 def _vanishing(segment: Segment, test: str) -> Landmark | None:
@@ -183,8 +195,11 @@ def _vanishing(segment: Segment, test: str) -> Landmark | None:
 
 
 def refusal(family: Family, good: BranchPoint, bad: Refuted) -> Landmark:
-    """Locate where solutions cease to be gaits, between a gait and a solution that is none."""
-    flawed = bad.gait
+    """Locate where solutions cease to be gaits, between a gait and a solution that is none.
+
+    A leg that only just clears the ground makes a gait doubtful; the landmark is before that.
+    """
+    torn = bad.gait
     direction = bad.point - good.point
     length = float(np.linalg.norm(direction))
     direction /= length
@@ -194,54 +209,46 @@ def refusal(family: Family, good: BranchPoint, bad: Refuted) -> Landmark:
         anchor = good.point + direction * (middle - low)
         attempt = family.correct(anchor, Slice(direction, anchor))
         if not attempt.solved:
-            break
+            high = middle
+            continue
         point = family.visit(attempt, direction)
-        if isinstance(point, Refuted):
-            flawed, high = point.gait, middle
+        if isinstance(point, Refuted) or point.gait.doubt is not None:
+            high = middle
+            # A run that grazes ends there, so what lies beyond is told by one that does not.
+            grazes = point.gait.trajectory.outcome.kind is GRAZED
+            if isinstance(point, Refuted) and not grazes:
+                torn = point.gait
         else:
             good, low = point, middle
-    return Landmark(*_flaw(good.gait, bad.gait, flawed), good)
+    mark = tear(good, just_beyond(family, good, direction)) or tear(good, torn.trajectory)
+    return mark or Landmark(REFUTED, torn.flaw or torn.doubt or "", good)
 
 
-def _flaw(good: Gait, bad: Gait, nearest: Gait) -> tuple[str, str]:
-    """What a solution does that the gait before it does not; ``nearest`` is one close to that."""
-    for side in good.touchdown_angles:
-        touchdown = f"{side} touchdown"
-        if bad.contacts.count(touchdown) > good.contacts.count(touchdown):
-            return SECOND_TOUCHDOWN, (
-                f"the {side} leg grazes the ground and beyond touches down once more"
-            )
-    return REFUTED, nearest.flaw or ""
+def just_beyond(family: Family, here: BranchPoint, direction: Array) -> Trajectory:
+    """A run from a little further on, far enough not to graze."""
+    for step in BEYOND:
+        trajectory = family.problem.evaluate(here.point + step * direction).trajectory
+        if trajectory.outcome.kind is not GRAZED:
+            break
+    return trajectory
 
 
 def tear(here: BranchPoint, beyond: Trajectory) -> Landmark | None:
     """What tears the motion at the end of a branch, told by a run from just beyond it."""
-    if beyond.outcome.kind is GRAZED:
-        return Landmark(GRAZING, f"the motion grazes: {beyond.outcome.message}", here)
-    events = _contacts(here.gait.trajectory)
-    others = _contacts(beyond)
+    events, others = contact_times(here.gait.trajectory), contact_times(beyond)
     if events and events[0][1] < AT_APEX:
         leg = events[0][0].split()[0]
-        return Landmark(
-            NO_FLIGHT, f"the {leg} leg lands at the apex, so the flight there ends", here
-        )
-    for (name, time), (other, when) in zip(events, others, strict=False):
+        detail = f"the {leg} leg lands at the apex, so the flight there ends"
+        return Landmark(NO_FLIGHT, detail, here)
+    padded = [*events, ("", inf)]
+    for number, ((name, time), (other, when)) in enumerate(zip(padded, others, strict=False)):
         if name == other and abs(time - when) < TORN:
             continue
-        if other.endswith("touchdown") and when < time:
-            leg = other.split()[0]
-            where = f"{when:.4f} s after the apex"
-            return Landmark(
-                GRAZING, f"the {leg} leg grazes the ground {where} and beyond lands there", here
-            )
-        return None
+        leg, _, what = other.partition(" ")
+        if what != "touchdown" or when >= time:
+            return None
+        detail = f"the {leg} leg grazes the ground {when:.4f} s after the apex and beyond "
+        if other in [landed for landed, _ in events[:number]]:
+            return Landmark(SECOND_TOUCHDOWN, f"{detail}touches down a second time", here)
+        return Landmark(GRAZING, f"{detail}lands there", here)
     return None
-
-
-def _contacts(trajectory: Trajectory) -> list[tuple[str, float]]:
-    return [
-        (name, event.time)
-        for event in trajectory.events
-        for name in event.names
-        if name.endswith(("touchdown", "lift-off"))
-    ]

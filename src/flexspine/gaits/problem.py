@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import log
+from math import isfinite, log
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from flexspine.hybrid.sensitivity import Deviation, propagate
 from flexspine.hybrid.trajectory import HybridState, Trajectory
 from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
-from flexspine.parameters import values
+from flexspine.parameters import is_number, shortened, values
 
 ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
 
@@ -104,9 +104,13 @@ class Problem:
     def _check(self) -> None:
         model, coordinates = self.model, self.system.section.coordinates
         known = (*coordinates, *ANGLES, "energy", "mean_speed")
-        for name in self.fixed:
+        for name, value in self.fixed.items():
             if name not in known:
                 raise UnknownNameError("quantity", name, known)
+            if not (is_number(value) and isfinite(value)):
+                raise ParameterError(f"{name} = {shortened(value)} is not usable", "give a number")
+            if name in ("mean_speed", "speed") and value < 0:
+                raise ParameterError(f"{name} = {value:g} is backward", "give 0 or more")
         parameters = model.parameter_names[: -len(ANGLES)]
         for name in self.free:
             if name not in parameters:

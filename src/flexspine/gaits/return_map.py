@@ -8,10 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
+from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.compile import Array
+from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.sensitivity import Deviation, propagate
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import Trajectory
+from flexspine.models.model import Model
+from flexspine.models.simulation import DEFAULT_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -71,3 +75,28 @@ def linearize(trajectory: Trajectory, parameters: Sequence[sp.Symbol] = ()) -> R
     start = Deviation(states, np.zeros((len(system.held), d + k)), moved)
     end = propagate(trajectory, start)
     return ReturnMap(trajectory, end.states, end.time, end.rates)
+
+
+def stride_map(
+    model: Model,
+    *,
+    strides: int = 1,
+    parameters: Sequence[str] = (),
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> ReturnMap:
+    """Run from the model's apex to the next and differentiate, gait or not.
+
+    ``parameters`` by dotted name, ``touchdown.fore`` and ``touchdown.hind`` among them; columns are
+    apex coordinates in the order of ``model.apex`` and then these. SI and radians. Raises
+    `UnknownNameError`, and `ParameterError` for a run that does not come back.
+    """
+    names = model.parameter_names
+    for name in parameters:
+        if name not in names:
+            raise UnknownNameError("parameter", name, names)
+    trajectory = integrate(model.bind(tolerance), model.apex_state(), crossings=strides)
+    if not trajectory.outcome.completed:
+        raise ParameterError(
+            f"there is no stride to differentiate ({trajectory.outcome})", trajectory.outcome.advice
+        )
+    return linearize(trajectory, [model.system.parameters[names.index(n)] for n in parameters])

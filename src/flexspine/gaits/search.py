@@ -14,6 +14,7 @@ from flexspine.gaits.newton import solve
 from flexspine.gaits.problem import Problem
 from flexspine.gaits.starts import Sampler
 from flexspine.hybrid.compile import Array
+from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
 from flexspine.models.simulation import DEFAULT_TOLERANCE
 from flexspine.parameters import values
@@ -92,12 +93,11 @@ def find_gaits(
     gait alone.
     """
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
-    reversal = model.system.reversal
-    coordinates = wanted.keys() & model.system.section.coordinates.keys()
-    has_symmetry = (
-        reversal is not None and model.alike and coordinates <= reversal.coordinates.keys()
-    )
-    kinds = [symmetric] if symmetric is not None else [True, False] if has_symmetry else [False]
+    ranges = {**(bounds or {}), **(free or {})}
+    _check_request(model, free or {}, starts, seed)
+    kinds = [symmetric] if symmetric is not None else [True, False]
+    if symmetric is None and not _symmetry_allows(model, {*wanted, *ranges}):
+        kinds = [False]
     tally: Counter[str] = Counter()
     dropped: Counter[str] = Counter()
     found: list[Gait] = []
@@ -106,13 +106,38 @@ def find_gaits(
             model, wanted, free=tuple(free or ()), symmetric=kind, tolerance=tolerance
         )
         _check_count(problem)
-        sampler = Sampler(problem, np.random.default_rng(seed), {**(bounds or {}), **(free or {})})
+        sampler = Sampler(problem, np.random.default_rng(seed), ranges)
         for count in range(starts):
             _try(problem, sampler, found, tally)
             progress((number + (count + 1) / starts) / len(kinds))
         dropped.update(sampler.dropped)
     found.sort(key=lambda gait: (not gait.symmetric, gait.family, gait.model.touchdown["fore"]))
     return Search(tuple(found), dict(tally), dict(dropped))
+
+
+def _symmetry_allows(model: Model, names: set[str]) -> bool:
+    """Whether a model has symmetric gaits in which these names mean something."""
+    reversal = model.system.reversal
+    if reversal is None or not model.alike:
+        return False
+    decided = model.system.section.coordinates.keys() - reversal.coordinates.keys()
+    return not any(name in decided or name.split(".")[0] in SIDES for name in names)
+
+
+def _check_request(
+    model: Model, free: Mapping[str, tuple[float, float]], starts: int, seed: int
+) -> None:
+    given = values(model.parameters)
+    for name, (low, high) in free.items():
+        if low <= 0 < given.get(name, 0.0):
+            raise ParameterError(
+                f"'{name}' from {low:g} to {high:g} would vanish", "give a range above zero"
+            )
+    for name, count, least in (("starts", starts, 1), ("seed", seed, 0)):
+        if not (isinstance(count, int) and count >= least):
+            raise ParameterError(
+                f"{name} = {count} is not usable", f"give a whole number from {least} on"
+            )
 
 
 def _counted(counts: Mapping[str, int]) -> str:
@@ -127,7 +152,7 @@ def _own_values(model: Model, tolerance: float) -> dict[str, float]:
             f"the start of '{model.name}' is no gait ({own.flaw})",
             "say what is fixed: energy, height and mean_speed",
         )
-    return {"energy": own.energy, "height": model.apex["height"], "mean_speed": own.mean_speed}
+    return own.quantities
 
 
 def _check_count(problem: Problem) -> None:
@@ -155,6 +180,9 @@ def _try(problem: Problem, sampler: Sampler, found: list[Gait], tally: Counter[s
     attempt = solve(problem, sampler.draw(), bounds=sampler.limits)
     if not attempt.solved:
         tally[attempt.reason or ""] += 1
+        return
+    if not sampler.contains(attempt.point):
+        tally["left_bounds"] += 1
         return
     gait = confirm(problem, attempt.point)
     if gait is None:

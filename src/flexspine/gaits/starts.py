@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from math import asin, pi, sqrt
+from math import asin, inf, pi, sqrt
 
 import numpy as np
 
@@ -42,7 +42,11 @@ class Sampler:
         bounds: Mapping[str, tuple[float, float]],
     ) -> None:
         self.problem, self.generator = problem, generator
-        for name in bounds:
+        for name, (low, high) in bounds.items():
+            if not -inf < low < high < inf:
+                raise ParameterError(
+                    f"bounds {low:g} to {high:g} of '{name}' are no range", "give low before high"
+                )
             if name not in problem.unknowns:
                 raise ParameterError(
                     f"bounds for '{name}', which is not unknown",
@@ -53,13 +57,10 @@ class Sampler:
             for name in problem.unknowns
         ]
         self.low, self.high = np.array(pairs).T
-        # Solutions may lie outside of where starts do, but not by far.
+        # Iterations may leave for a while, and solutions too where no bounds are given.
         room = self.high - self.low
-        given = np.array([name in bounds for name in problem.unknowns])
-        self.limits = (
-            np.where(given, self.low, self.low - room),
-            np.where(given, self.high, self.high + room),
-        )
+        self.limits = self.low - room, self.high + room
+        self._given = np.array([name in bounds for name in problem.unknowns])
         self.posture = np.array(["pitch" in name for name in problem.unknowns])
         self.dropped: Counter[str] = Counter()
 
@@ -83,6 +84,11 @@ class Sampler:
             return -LARGEST_PITCH, LARGEST_PITCH
         given = values(problem.model.parameters)[name]
         return 0.5 * given, 2.0 * given
+
+    def contains(self, point: Array) -> bool:
+        """Whether a point keeps the bounds that were given."""
+        outside = (point < self.low) | (point > self.high)
+        return not np.any(outside & self._given)
 
     def draw(self) -> Array:
         """Draw a start from which the animal comes back; what was ``dropped`` is counted."""

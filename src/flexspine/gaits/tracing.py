@@ -14,7 +14,7 @@ import numpy as np
 from flexspine.errors import ParameterError
 from flexspine.gaits.family import FOLD, BranchPoint, Family, Refuted
 from flexspine.gaits.gait import Gait
-from flexspine.gaits.landmarks import Landmark, Segment, landmarks, refusal, tear
+from flexspine.gaits.landmarks import Landmark, Segment, just_beyond, landmarks, refusal, tear
 from flexspine.gaits.newton import Slice, solve
 
 # Natural units along the branch.
@@ -28,8 +28,10 @@ STRAIGHT = 0.95
 # Corrections needed at a step of good length.
 FEW, MANY = 2, 4
 
-# Natural units; a branch that comes back this close to its start is closed.
-CLOSED_CURVE = 0.5 * LONGEST_STEP
+# A branch is closed if its start lies this near a piece of it, per length of the piece.
+NARROW = 0.2
+
+CLOSED_BRANCH = "closed: it comes back to where it began"
 
 # No closed branch is as short as this many points.
 CLOSING = 8
@@ -54,6 +56,10 @@ class Tracer:
         low, high = bounds
         if not low < high:
             raise ParameterError(f"bounds {low:g} to {high:g} are empty", "give low before high")
+        if not longest_step > 0:
+            raise ParameterError(
+                f"longest_step = {longest_step:g} is not usable", "give a number above zero"
+            )
         self.family, self.low, self.high = family, low, high
         self.longest_step, self.most_points = longest_step, most_points
 
@@ -80,6 +86,8 @@ class Tracer:
         """Yield the tracing after every step, until it has an end."""
         while tracing.end is None:
             tracing = self._step(tracing)
+            if tracing.end is not None:
+                tracing = _without_doubt(tracing)
             yield tracing
 
     def _step(self, tracing: Tracing) -> Tracing:
@@ -99,10 +107,11 @@ class Tracer:
             return self._shorter(tracing, "the branch turns too sharply")
         if not self.low <= point.value <= self.high:
             return self._reach_bound(tracing, point)
-        end = None
         if _closes(tracing.points, point):
-            end = "closed: it comes back to where it began"
-        elif len(tracing.points) >= self.most_points:
+            # The start once more, so that what happens on the last piece is not missed.
+            return _extended(tracing, family, tracing.points[0], end=CLOSED_BRANCH)
+        end = None
+        if len(tracing.points) >= self.most_points:
             end = f"left after {self.most_points} points"
         factor = 1.5 if attempt.iterations <= FEW else 0.7 if attempt.iterations > MANY else 1.0
         longer = min(self.longest_step, step * factor)
@@ -126,8 +135,7 @@ class Tracer:
         if step >= SHORTEST_STEP:
             return replace(tracing, step=step)
         here = tracing.points[-1]
-        beyond = self.family.problem.evaluate(here.point + tracing.step * here.tangent)
-        mark = tear(here, beyond.trajectory)
+        mark = tear(here, just_beyond(self.family, here, here.tangent))
         if mark is None:
             end = f"no gait found beyond {self.family.over} = {here.value:.6g} ({reason})"
             return replace(tracing, end=end)
@@ -158,10 +166,24 @@ def _extended(
     )
 
 
+def _without_doubt(tracing: Tracing) -> Tracing:
+    """Leave out last points that recording does not confirm, as a leg grazes the ground there."""
+    points = tracing.points
+    while len(points) > 1 and points[-1].gait.doubt is not None:
+        points = points[:-1]
+    return replace(tracing, points=points)
+
+
 def _closes(points: tuple[BranchPoint, ...], point: BranchPoint) -> bool:
-    start = points[0]
-    near = float(np.linalg.norm(point.point - start.point)) < CLOSED_CURVE
-    return len(points) > CLOSING and near and float(point.tangent @ start.tangent) > STRAIGHT
+    """Whether the start lies on the way from the last point to a new one."""
+    start, here = points[0], points[-1]
+    if len(points) < CLOSING or float(point.tangent @ start.tangent) < STRAIGHT:
+        return False
+    chord = point.point - here.point
+    length = float(np.linalg.norm(chord))
+    along = float((start.point - here.point) @ chord) / length
+    aside = np.linalg.norm(start.point - here.point - along * chord / length)
+    return 0 <= along <= length and float(aside) < NARROW * length
 
 
 def land(family: Family, segment: Segment, value: float) -> BranchPoint | None:

@@ -115,6 +115,8 @@ class _Propagation:
             inputs[:n], inputs[n : n + m] = states[:, None], held[:, None]
             inputs[n + m :] = self.deviations
             jump = self.code.jump(mode, name)
+            if jump.target is None and event is not self.trajectory.events[-1]:
+                continue  # a section on the way; only the last one fixes the instant
             answer = jump.function(inputs, pars=self.raw[: jump.function.nparams])
             self.rates.append(float(answer[0, 0]))
             self.time = answer[1]

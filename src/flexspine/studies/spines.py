@@ -90,7 +90,7 @@ class Sweep:
     speed: float
     branch: Branch
     stiff: tuple[tuple[float, Gait, Stability], ...]
-    locked: Gait | None
+    locked: BranchPoint | None
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def _sweep(
     branch = trace(starts[0].gait, "spine.stiffness", bounds, f"over stiffness at {speed:g}")
     locked = study.specimen(LOCKED).at(speed)
     stiff = () if locked is None else tuple(_stiff(starts[0].gait.model, locked.gait, setting))
-    return Sweep(speed, branch, stiff, None if locked is None else locked.gait)
+    return Sweep(speed, branch, stiff, locked)
 
 
 def _stiff(model: Model, locked: Gait, setting: Setting) -> Iterator[tuple[float, Gait, Stability]]:

@@ -73,9 +73,8 @@ def stiffness_table(study: SpineStudy) -> list[Row]:
             add(sweep.speed, CONTINUED, point.value, point.gait, point.stability)
         for stiffness, gait, stability in sweep.stiff:
             add(sweep.speed, STIFF, stiffness, gait, stability)
-        locked = study.specimen(LOCKED).at(sweep.speed)
-        if locked is not None:
-            add(sweep.speed, LOCKED, None, locked.gait, locked.stability)
+        if sweep.locked is not None:
+            add(sweep.speed, LOCKED, None, sweep.locked.gait, sweep.locked.stability)
     return rows
 
 

@@ -1,0 +1,240 @@
+"""``flexspine study``: rigid against flexible spine, the published comparison done again."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import sys
+import textwrap
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.options import Json, span
+from flexspine.cli.output import Steps, print_json, steps
+from flexspine.errors import ParameterError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from flexspine.studies.claims import Verdict
+    from flexspine.studies.spines import Setting, SpineStudy
+
+UNFINISHED = "branches.unfinished"
+
+
+def study(
+    energy: Annotated[float, typer.Option(help="Total energy of every gait, in J.")] = 290.0,
+    height: Annotated[float, typer.Option(help="Apex height of every gait, in m.")] = 0.32,
+    stiffness: Annotated[
+        list[float] | None,
+        typer.Option(help="Spine stiffness in N m/rad; repeat it (default 200, 220, 240, 260)."),
+    ] = None,
+    speeds: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="Range of mean speeds, in m/s.")
+    ] = "2.4:4.7",
+    compare: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Mean speed in m/s of profiles and of sweeps over stiffness; repeat it "
+            "(default 4.0, 4.25, 4.5)."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write tables, figures and verdicts into this directory.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Compare bounding with a rigid, a locked and a flexible spine, and judge the published claims.
+
+    Follows the gaits of each body over mean speed, and over spine stiffness at fixed speeds. With
+    --out, a study that was interrupted goes on where it was when the same command is given again.
+    Units are SI and radians. Exit code 0: done; 2: bad input; 3: the machine failed;
+    130: interrupted.
+
+    Examples:
+        flexspine study --out results
+
+        flexspine study --stiffness 180 --stiffness 300 --speeds 3.8:4.6 --json
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.studies.claims import verdicts
+    from flexspine.studies.spines import Setting, study_spines
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    usual = Setting()
+    setting = Setting(
+        energy=energy,
+        height=height,
+        speeds=span("--speeds", speeds),
+        stiffnesses=tuple(stiffness or usual.stiffnesses),
+        compared=tuple(compare or usual.compared),
+    )
+    with ExitStack() as stack:
+        progress = stack.enter_context(steps())
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        store = None if out is None else out / UNFINISHED
+        if store is not None:
+            store.mkdir(exist_ok=True)
+            stack.callback(_remove_empty, store)
+        try:
+            result = study_spines(setting, store, partial(_show, progress))
+            progress.begin("judging the claims")
+            judged = verdicts(result)
+            if directory is not None and store is not None:
+                with directory.stage() as stage:
+                    _write(stage, result, judged, progress)
+                shutil.rmtree(store)
+        except ParameterError:
+            if store is not None:
+                shutil.rmtree(store)
+            raise
+        except KeyboardInterrupt:
+            if store is not None:
+                print(
+                    f"flexspine: what was found is in '{store}'; the same command goes on from it",
+                    file=sys.stderr,
+                )
+            raise
+    if json:
+        print_json(_record(result, judged))
+    else:
+        print(_report(judged))
+        if out is not None:
+            print(f"results in {out}")
+    return 0
+
+
+def _show(progress: Steps, what: str, share: float) -> None:
+    progress.begin(what)
+    progress.at(share)
+
+
+def _remove_empty(store: Path) -> None:
+    if store.is_dir() and not any(store.iterdir()):
+        store.rmdir()
+
+
+def _write(stage: Path, result: SpineStudy, judged: list[Verdict], progress: Steps) -> None:
+    from flexspine.cli.results import write_json
+    from flexspine.gaits.files import save_gait
+    from flexspine.models.dataset import to_dataset
+    from flexspine.report import study_figures as figures
+    from flexspine.studies import tables
+
+    progress.begin("writing tables")
+    gaits, stiffness = tables.gaits_table(result), tables.stiffness_table(result)
+    for name, rows in (
+        ("gaits", gaits),
+        ("stiffness", stiffness),
+        ("landmarks", tables.landmarks_table(result)),
+    ):
+        for suffix in ("csv", "parquet"):
+            tables.write_table(rows, stage / f"{name}.{suffix}")
+    write_json(_record(result, judged), stage / "study.json")
+    (stage / "verdicts.md").write_text(_markdown(result.setting, judged), encoding="utf-8")
+    profiles = {}
+    for specimen in result.specimens:
+        for speed in result.setting.compared:
+            point = specimen.at(speed)
+            if point is not None:
+                save_gait(point.gait, stage / _file(specimen.label, speed))
+                profiles[specimen.label, speed] = to_dataset(point.gait.run)
+    drawings: dict[str, Callable[[], Figure]] = {
+        "peak_grf_over_speed": lambda: figures.plot_peak_grf(gaits, tables.published_readings()),
+        "profiles": lambda: figures.plot_profiles(profiles, result.setting.compared),
+        "energy_shares": lambda: figures.plot_energy_shares(profiles, result.setting.compared[-1]),
+        "stability_over_speed": lambda: figures.plot_stability_speed(gaits),
+        "stability_over_stiffness": lambda: figures.plot_stability_stiffness(stiffness),
+        "peak_grf_over_stiffness": lambda: figures.plot_peak_grf_stiffness(stiffness),
+    }
+    for number, (name, draw) in enumerate(drawings.items()):
+        _show(progress, f"drawing {name}", number / len(drawings))
+        draw().savefig(stage / f"{name}.png")
+
+
+def _file(label: str, speed: float) -> str:
+    """The file of the gait of a body at a speed."""
+    body = label.replace(" N m/rad", "").replace(", k_t = ", " ").replace(" ", "-")
+    return f"gait-{body}-at-{speed:g}.json"
+
+
+def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
+    setting = result.setting
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "flexspine": __version__,
+        "setting": {
+            "energy": setting.energy,
+            "height": setting.height,
+            "speeds": list(setting.speeds),
+            "stiffnesses": list(setting.stiffnesses),
+            "compared": list(setting.compared),
+        },
+        "verdicts": [
+            {
+                "claim": verdict.number,
+                "statement": verdict.claim,
+                "verdict": verdict.verdict,
+                "finding": verdict.finding,
+                "numbers": verdict.numbers,
+                "runs": [
+                    {"body": label, "mean_speed": speed, "gait": _file(label, speed)}
+                    for label, speed in verdict.runs
+                ],
+            }
+            for verdict in judged
+        ],
+        "branches": [
+            {
+                "body": specimen.body,
+                "spine_stiffness": specimen.stiffness,
+                "gaits": len(specimen.branch.points),
+                "mean_speed": [specimen.branch.points[i].value for i in (0, -1)],
+                "ends": list(specimen.branch.ends),
+            }
+            for specimen in result.specimens
+        ],
+        "sweeps": [
+            {
+                "mean_speed": sweep.speed,
+                "gaits": len(sweep.branch.points),
+                "spine_stiffness": [sweep.branch.points[i].value for i in (0, -1)],
+                "ends": list(sweep.branch.ends),
+                "next_to_locked": len(sweep.stiff),
+            }
+            for sweep in result.sweeps
+        ],
+    }
+
+
+def _markdown(setting: Setting, judged: list[Verdict]) -> str:
+    lines = [
+        "# Verdicts",
+        "",
+        f"Energy {setting.energy:g} J, apex height {setting.height:g} m. Symmetric gaits that land "
+        "on the fore leg first. Peak GRF is the largest magnitude of the leg force, per pair of "
+        "legs; k_t is on the relative angle. Two baselines: the rigid body as published, and the "
+        "flexible body with its spine locked.",
+        "",
+    ]
+    for verdict in judged:
+        lines += [f"## {verdict.number}. {verdict.claim[0].upper()}{verdict.claim[1:]}", ""]
+        lines += [f"**{verdict.verdict}**: {verdict.finding}.", ""]
+        files = ", ".join(f"`{_file(label, speed)}`" for label, speed in verdict.runs)
+        lines += [f"Runs: {files}; all gaits are in `gaits.csv` and `stiffness.csv`.", ""]
+    return "\n".join(lines)
+
+
+def _report(judged: list[Verdict]) -> str:
+    """The verdicts for a person."""
+    lines = []
+    for verdict in judged:
+        lines.append(f"{verdict.number}. {verdict.claim}: {verdict.verdict.upper()}")
+        lines += textwrap.wrap(verdict.finding, 96, initial_indent="   ", subsequent_indent="   ")
+    return "\n".join(lines)
