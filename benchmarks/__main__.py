@@ -111,7 +111,8 @@ def field_benchmark() -> dict[str, float]:
     )
     bound = model.bind(1e-12)
     mode = bound.mode("DS")
-    held = np.array([*toes, 1.0, 1.0])
+    held = np.zeros(len(model.system.held))
+    held[:2] = toes
     with_events = mode.enter(0.0, np.append(start, 0.0), held)
     derived = hy.taylor_adaptive(
         with_events.sys, np.append(start, 0.0).tolist(), pars=with_events.pars.tolist(), tol=1e-12

@@ -64,7 +64,6 @@ def bound(
         flexspine bound --gait results/gait-1.json --strides 10
     """
     from flexspine.cli.results import ResultDirectory
-    from flexspine.gaits.files import load_gait
     from flexspine.gaits.record import run_record
     from flexspine.models.dataset import DEFAULT_INTERVAL, check_interval
     from flexspine.models.presets import load_model
@@ -77,6 +76,8 @@ def bound(
         refuse_besides_gait(
             {"--preset": preset, "--set": set_, "--apex": apex, "--touchdown": touchdown}
         )
+        from flexspine.gaits.files import load_gait
+
         saved = load_gait(gait)
         model = saved.model
         if duration is None:

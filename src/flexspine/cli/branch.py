@@ -82,7 +82,7 @@ def branch(
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.gaits.continuation import trace_branch
-    from flexspine.gaits.record import branch_record
+    from flexspine.gaits.gait_record import branch_record
     from flexspine.gaits.tracing import LONGEST_STEP
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo

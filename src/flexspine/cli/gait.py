@@ -90,7 +90,7 @@ def gait(
         flexspine gait --energy 290 --fix height=0.32 --fix touchdown.fore=0.46 --json
     """
     from flexspine.cli.results import ResultDirectory
-    from flexspine.gaits.record import gait_record
+    from flexspine.gaits.gait_record import gait_record
     from flexspine.gaits.search import DEFAULT_STARTS, find_gaits
     from flexspine.models.presets import load_model
 

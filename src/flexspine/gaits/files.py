@@ -8,7 +8,7 @@ from typing import Any
 
 from flexspine.errors import InputError, PresetError
 from flexspine.gaits.gait import Gait, examine
-from flexspine.gaits.record import gait_record
+from flexspine.gaits.gait_record import gait_record
 from flexspine.models.model import Model, Source
 from flexspine.models.registry import find_kind
 from flexspine.models.simulation import DEFAULT_TOLERANCE

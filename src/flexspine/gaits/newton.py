@@ -148,5 +148,10 @@ def _step(jacobian: Array, here: _Trial, cut: Slice | None) -> Array:
 
 
 def _least_squares(jacobian: Any, residual: Any) -> Array:
+    if jacobian.shape[0] == jacobian.shape[1]:
+        try:
+            return np.asarray(np.linalg.solve(jacobian, -residual))
+        except np.linalg.LinAlgError:
+            pass  # the shortest of many steps then
     step: Array = np.linalg.lstsq(jacobian, -residual, rcond=None)[0]
     return step

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eig
 
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.return_map import ReturnMap, linearize, section_rows
@@ -96,19 +95,17 @@ def floquet_multipliers(gait: Gait, linear: ReturnMap | None = None) -> Stabilit
     jacobian = result.by_state
     scales = np.array([gait.model.scales[name] for name in section.coordinates])
     scaled = jacobian * scales / scales[:, None]
-    values, left, right = eig(scaled, left=True, right=True)
+    values, vectors = np.linalg.eig(scaled)
     order = _order(values)
-    overlap = np.abs(np.einsum("ij,ij->j", left.conj(), right))
-    with np.errstate(divide="ignore"):
-        condition = 1 / overlap[order]
+    vectors = vectors[:, order].astype(complex)
     gradient, identity = _energy_identity(gait, jacobian)
     return Stability(
         coordinates=tuple(section.coordinates),
         scales=scales,
         jacobian=jacobian,
-        multipliers=values[order],
-        vectors=right[:, order],
-        condition_numbers=condition,
+        multipliers=values[order].astype(complex),
+        vectors=vectors,
+        condition_numbers=_condition_numbers(vectors),
         jacobian_error=SAFETY * gait.tolerance * float(np.linalg.norm(scaled, 2)),
         energy_identity=identity,
         energy_gradient=gradient,
@@ -125,6 +122,15 @@ def _energy_identity(gait: Gait, jacobian: Array) -> tuple[Array | None, float |
     gradient = values.by_states[list(system.section.quantities).index("energy")][at]
     defect = np.linalg.norm(gradient @ jacobian - gradient) / np.linalg.norm(gradient)
     return gradient, float(defect)
+
+
+def _condition_numbers(vectors: ComplexArray) -> Array:
+    """Of eigenvalues with these right eigenvectors of length one; infinite if they coincide."""
+    try:
+        left = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        return np.full(len(vectors), np.inf)
+    return np.asarray(np.linalg.norm(left, axis=1))
 
 
 def _sorted(values: ComplexArray) -> ComplexArray:

@@ -81,6 +81,7 @@ class CompiledMode:
         self.guards = slice(0, 2 * len(jumps))
         self.by_name = {jump.guard.name: jump for jump in jumps}
         self.due_here = _due(mode, mode)
+        self.n_inputs, self.n_answers = kernel.nparams, kernel.nouts
         self.state: Array = integrator.state
         self.numbers: Array = integrator.pars
         self.owner: BoundMode | None = None
@@ -217,15 +218,17 @@ class BoundMode:
 
     def __init__(self, code: CompiledMode, n_held: int, parameters: Array) -> None:
         self.code = code
-        room = np.zeros(n_held)
-        folded = code.coefficients(parameters) if parameters.size else np.zeros(0)
-        numbers = np.concatenate([room, folded])
-        self._numbers = numbers[: code.numbers.size]
-        self._inputs = np.concatenate([room, parameters])[: code.kernel.nparams]
-        self._answer = np.empty(code.kernel.nouts)
         # Code that needs few numbers may not reach as far as all held variables.
-        self._n_held = min(n_held, self._numbers.size)
-        self._n_inputs_held = min(n_held, self._inputs.size)
+        count, inputs = code.numbers.size, code.n_inputs
+        self._numbers = np.zeros(count)
+        if count > n_held:
+            self._numbers[n_held:] = code.coefficients(parameters)[: count - n_held]
+        self._inputs = np.zeros(inputs)
+        if inputs > n_held:
+            self._inputs[n_held:] = parameters[: inputs - n_held]
+        self._answer = np.empty(code.n_answers)
+        self._n_held = min(n_held, count)
+        self._n_inputs_held = min(n_held, inputs)
 
     def enter(self, time: float, states: Array, held: Array) -> Any:
         """Return the integrator, set to a point of this mode."""

@@ -325,6 +325,12 @@ def _stability(study: SpineStudy) -> Verdict:
                 entry[baseline] = radius
                 text += f", {baseline} {radius:.3f}"
                 best_of_all.append(best[2] < radius)
+        if sweep.stiff:
+            stiff = min(sweep.stiff, key=lambda item: item[2].level_spectral_radius)
+            radius = stiff[2].level_spectral_radius
+            entry["best_next_to_locked"] = {"stiffness": stiff[0], "level_spectral_radius": radius}
+            text += f", next to the locked spine {radius:.3f} at k_t = {stiff[0]:.0f}"
+            best_of_all.append(best[2] < radius)
         told.append(text)
         numbers[f"{sweep.speed:g} m/s"] = entry
     if all(interior) and all(best_of_all) and interior:
