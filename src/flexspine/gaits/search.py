@@ -22,6 +22,10 @@ from flexspine.parameters import values
 # Natural units; gaits closer than this are one.
 DISTINCT = 1e-6
 
+# Where a family just begins or folds, two solutions meet: the equations are nearly singular, and
+# the residual leaves a solution open to the square root of itself.
+SINGULAR, DOUBLE_ROOT = 1e-3, 1e-4
+
 DEFAULT_STARTS = 100
 
 ADVICE = {
@@ -189,8 +193,15 @@ def _try(problem: Problem, sampler: Sampler, found: list[Gait], tally: Counter[s
         tally["refuted"] += 1
         return
     tally["found"] += 1
-    if not any(same_orbit(gait, other) for other in found):
+    apart = DISTINCT
+    if attempt.linear is not None and _nearly_singular(attempt.linear.matrix):
+        apart = DOUBLE_ROOT
+    if not any(same_orbit(gait, other, apart) for other in found):
         found.append(gait)
+
+
+def _nearly_singular(matrix: Array) -> bool:
+    return float(np.linalg.svd(matrix, compute_uv=False)[-1]) < SINGULAR
 
 
 def confirm(problem: Problem, point: Array) -> Gait | None:
@@ -202,13 +213,16 @@ def confirm(problem: Problem, point: Array) -> Gait | None:
     return gait if gait.flaw is None else None
 
 
-def same_orbit(one: Gait, other: Gait) -> bool:
-    """Whether two gaits of one animal are the same orbit, perhaps seen from different apexes."""
+def same_orbit(one: Gait, other: Gait, apart: float = DISTINCT) -> bool:
+    """Whether two gaits of one animal are the same orbit, perhaps seen from different apexes.
+
+    ``apart`` is how far apart distinct ones are, in natural units.
+    """
     angles = [abs(one.model.touchdown[s] - other.model.touchdown[s]) for s in one.model.touchdown]
-    if max(angles) > DISTINCT:
+    if max(angles) > apart:
         return False
     parameters, others = values(one.model.parameters), values(other.model.parameters)
     if any(abs(parameters[n] - others[n]) > DISTINCT * abs(others[n]) for n in parameters):
         return False
     start = one.orbit[0]
-    return bool(np.any(np.max(np.abs(other.orbit - start), axis=1) < DISTINCT))
+    return bool(np.any(np.max(np.abs(other.orbit - start), axis=1) < apart))

@@ -31,6 +31,9 @@ FEW, MANY = 2, 4
 # A branch is closed if its start lies this near a piece of it, per length of the piece.
 NARROW = 0.2
 
+# Relative; a start this close to a bound is on it.
+SLACK = 1e-9
+
 CLOSED_BRANCH = "closed: it comes back to where it began"
 
 # No closed branch is as short as this many points.
@@ -74,7 +77,8 @@ class Tracer:
             raise ParameterError(
                 f"the branch cannot start here: it {point.gait.flaw}", "start it from a gait"
             )
-        if not self.low <= point.value <= self.high:
+        slack = SLACK * max(abs(self.low), abs(self.high))
+        if not self.low - slack <= point.value <= self.high + slack:
             raise ParameterError(
                 f"{family.over} = {point.value:g} of the gait is not within {self.low:g} to "
                 f"{self.high:g}",

@@ -25,7 +25,7 @@ from flexspine.gaits.landmarks import (
 from flexspine.models.dataset import VARIABLES
 from flexspine.models.registry import find_kind
 from flexspine.parameters import quantities
-from flexspine.report.caption import SIDES, _joined, _of_legs
+from flexspine.report.caption import SIDES, joined, of_legs
 from flexspine.report.style import (
     FAINT,
     GREEN,
@@ -160,12 +160,12 @@ def _details(record: Record, axis: Axis) -> list[str]:
     given = {name: value for name, value in gait["parameters"].items() if name != axis.name}
     parts = [f"{'symmetric' if record['symmetric'] else 'general'} gaits"]
     parts += [f"kept: {', '.join(kept)}"] if kept else []
-    both = _of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
+    both = of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     for name in ("spine.stiffness", "fore.leg.stiffness", "hind.leg.stiffness"):
         if name in given and not (both and "leg" in name):
             label, unit = NAMES[name]
             parts.append(f"{label} = {given[name]:g} {unit}")
-    return _joined([*parts, *both])
+    return joined([*parts, *both])
 
 
 def _forces(axes: Axes, points: list[Record]) -> list[Curve]:

@@ -23,9 +23,9 @@ def describe(dataset: xr.Dataset) -> list[str]:
         parts.append(f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad")
         if given.get("spine.damping"):
             parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
-    parts += _of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
+    parts += of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     if any(given.get(f"{side}.leg.damping") for side in SIDES):
-        parts += _of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
+        parts += of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
     angles = json.loads(dataset.attrs.get("touchdown_angles", "{}"))
     if angles:
         both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
@@ -37,10 +37,11 @@ def describe(dataset: xr.Dataset) -> list[str]:
         parts.append(f"mean speed {moved / duration:#.3g} m/s")
     origins = json.loads(dataset.attrs.get("provenance", "{}"))
     changed = [name for name, origin in origins.items() if origin == "set by user"]
-    return _joined(parts) + ([f"changed from the preset: {_few(changed)}"] if changed else [])
+    return joined(parts) + ([f"changed from the preset: {_few(changed)}"] if changed else [])
 
 
-def _of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str]:
+def of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str]:
+    """Say what a leg parameter is, once if both ends have the same."""
     fore, hind = (given.get(f"{side}.leg.{name}") for side in SIDES)
     if fore is None or hind is None:
         return []
@@ -48,7 +49,7 @@ def _of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str
     return [f"leg {what} {value} {unit}"]
 
 
-def _joined(parts: list[str], limit: int = 100) -> list[str]:
+def joined(parts: list[str], limit: int = 100) -> list[str]:
     """Fill lines with whole parts."""
     lines: list[str] = []
     for part in parts:

@@ -17,10 +17,11 @@ from flexspine.report.style import (
     ENERGY_COLORS,
     FAINT,
     INK,
+    LINE,
     PHASE_COLORS,
     SIDE_COLORS,
     SMALL_SIZE,
-    TITLE_SIZE,
+    add_title,
     themed,
 )
 from flexspine.report.timeline import (
@@ -45,8 +46,6 @@ if TYPE_CHECKING:
 MAX_EVENT_LINES = 80
 
 MANY_PHASES = 120  # from here on thick lines would run together
-
-LINE = 0.175  # in; from one line of the title to the next
 
 
 def plot_run(dataset: xr.Dataset) -> Figure:
@@ -76,26 +75,11 @@ def plot_run(dataset: xr.Dataset) -> Figure:
         elastic.set_xlabel("time (s)")
         figure.align_ylabels(panels)
         _add_key(figure, dataset, spans)
-        _add_title(figure, dataset, details, title)
+        early = ending(dataset)
+        add_title(figure, heading(dataset), details, wrap(early, 100) if early else ())
         figure.draw_without_rendering()
         label_phases(bar, spans, bar.get_position().width * width)
     return figure
-
-
-def _add_title(figure: Figure, dataset: xr.Dataset, details: list[str], height: float) -> None:
-    total = figure.get_size_inches()[1]
-    early = ending(dataset)
-    lines = [(heading(dataset), TITLE_SIZE, "bold")]
-    lines += [(line, SMALL_SIZE, "normal") for line in details]
-    if early:
-        lines += [(line, SMALL_SIZE, "bold") for line in wrap(early, 100)]
-        height += LINE * len(wrap(early, 100))
-    for number, (text, size, weight) in enumerate(lines):
-        figure.text(
-            0.015, 1 - (0.14 + LINE * number + (0.05 if number else 0)) / total, text,
-            fontsize=size, fontweight=weight, va="top", in_layout=False,
-        )  # fmt: skip
-    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - height / total))
 
 
 def _draw_height(axes: Axes, dataset: xr.Dataset) -> None:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from flexspine.errors import InputError
-from flexspine.report.caption import SIDES, _joined, _of_legs
+from flexspine.report.caption import SIDES, joined, of_legs
 from flexspine.report.figure import _shares
 from flexspine.report.style import (
     ENERGY_COLORS,
@@ -140,7 +140,7 @@ def start_figure(
     heading: str, parts: list[str], height: float, key: dict[str, Look], columns: int = 3
 ) -> Figure:
     """Return a figure without panels: a title, room of a height (in), and a key at its foot."""
-    details = _joined(parts, LETTERS)
+    details = joined(parts, LETTERS)
     height += 0.45 + LINE * (len(details) - (-len(key) // columns))
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     add_title(figure, heading, details)
@@ -197,9 +197,7 @@ def _setting(columns: list[dict[str, xr.Dataset]]) -> list[str]:
         values = [float(stride[name][0]) for stride in strides]
         if np.ptp(values) <= EQUAL * max(values):
             parts.append(f"{label} {values[0]:.4g} {unit}")
-    legs = [
-        _of_legs(_given(s), "stiffness $k_l$", "stiffness", "N/m per leg pair") for s in strides
-    ]
+    legs = [of_legs(_given(s), "stiffness $k_l$", "stiffness", "N/m per leg pair") for s in strides]
     parts += legs[0] if all(one == legs[0] for one in legs) else []
     return [*parts, "spine stiffness $k_t$ on the relative angle"]
 

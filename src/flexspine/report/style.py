@@ -6,7 +6,7 @@ every picture.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -104,14 +104,17 @@ def themed(changes: dict[str, Any] | None = None) -> Iterator[None]:
         yield
 
 
-def add_title(figure: Figure, heading: str, details: list[str]) -> None:
+def add_title(
+    figure: Figure, heading: str, details: list[str], warnings: Sequence[str] = ()
+) -> None:
     """Write a heading and lines of small type over a figure, which makes room for them."""
     height = figure.get_size_inches()[1]
     lines = [(heading, TITLE_SIZE, "bold"), *((line, SMALL_SIZE, "normal") for line in details)]
+    lines += [(line, SMALL_SIZE, "bold") for line in warnings]
     for number, (text, size, weight) in enumerate(lines):
         figure.text(
             0.015, 1 - (0.14 + LINE * number + (0.05 if number else 0)) / height, text,
             fontsize=size, fontweight=weight, va="top", in_layout=False,
         )  # fmt: skip
-    room = 0.38 + LINE * len(details)
+    room = 0.38 + LINE * (len(lines) - 1)
     figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - room / height))

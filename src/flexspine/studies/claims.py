@@ -7,18 +7,13 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
 from flexspine.gaits.gait import Gait
+from flexspine.studies.comparison import NO_DIFFERENCE, common_speeds, compare, peak
 from flexspine.studies.spines import LOCKED, RIGID, Specimen, SpineStudy, Sweep
 
 HOLDS, FAILS, DEPENDS = "holds", "fails", "depends on"
 
-# Relative; smaller differences are none.
-NO_DIFFERENCE = 1e-3
-
-# m/s between the speeds at which bodies are compared.
-SPEED_STEP = 0.05
+NO_SWEEP = "no speed was given at which to vary the stiffness"
 
 # Relative; a stiff spine whose gait is this close to the locked one's behaves like it.
 ALIKE = 0.01
@@ -46,74 +41,6 @@ def verdicts(study: SpineStudy) -> list[Verdict]:
     return [judge(study) for judge in judges]
 
 
-@dataclass(frozen=True)
-class _Comparison:
-    """Ratios of one measure, flexible over baseline, at every common speed and stiffness."""
-
-    baseline: str
-    ratios: tuple[tuple[float, float, float], ...]
-    """Each (stiffness, mean speed, ratio)."""
-
-    @property
-    def lowest(self) -> tuple[float, float, float]:
-        return min(self.ratios, key=lambda item: item[2])
-
-    @property
-    def highest(self) -> tuple[float, float, float]:
-        return max(self.ratios, key=lambda item: item[2])
-
-    @property
-    def below(self) -> int:
-        return sum(ratio < 1 - NO_DIFFERENCE for *_, ratio in self.ratios)
-
-    @property
-    def above(self) -> int:
-        return sum(ratio > 1 + NO_DIFFERENCE for *_, ratio in self.ratios)
-
-    def told(self, what: str) -> str:
-        if not self.ratios:
-            return f"no common speed with the {self.baseline} body"
-        (k0, v0, r0), (k1, v1, r1) = self.lowest, self.highest
-        return (
-            f"{what} over that of the {self.baseline} body: {r0:.3f} (k_t = {k0:g}, {v0:.2f} m/s) "
-            f"to {r1:.3f} (k_t = {k1:g}, {v1:.2f} m/s), lower in {self.below} and higher in "
-            f"{self.above} of {len(self.ratios)} pairs"
-        )
-
-    @property
-    def numbers(self) -> dict[str, Any]:
-        return {
-            "pairs": len(self.ratios),
-            "lower": self.below,
-            "higher": self.above,
-            "smallest_ratio": self.lowest[2] if self.ratios else None,
-            "largest_ratio": self.highest[2] if self.ratios else None,
-        }
-
-
-def _speeds(study: SpineStudy) -> list[float]:
-    """The grid of speeds at which bodies are compared."""
-    low, high = study.setting.speeds
-    first = int(np.ceil(low / SPEED_STEP - 1e-9))
-    last = int(np.floor(high / SPEED_STEP + 1e-9))
-    return [round(number * SPEED_STEP, 9) for number in range(first, last + 1)]
-
-
-def _compare(study: SpineStudy, measure: Callable[[Gait], float], baseline: str) -> _Comparison:
-    base = study.specimen(baseline)
-    ratios = []
-    for speed in _speeds(study):
-        reference = base.at(speed)
-        if reference is None:
-            continue
-        for specimen in study.flexible:
-            point = specimen.at(speed)
-            if point is not None:
-                ratio = measure(point.gait) / measure(reference.gait)
-                ratios.append((specimen.stiffness or 0.0, speed, ratio))
-    return _Comparison(baseline, tuple(ratios))
-
-
 def _runs(study: SpineStudy, speeds: Iterable[float]) -> tuple[tuple[str, float], ...]:
     return tuple(
         (specimen.label, speed)
@@ -121,11 +48,6 @@ def _runs(study: SpineStudy, speeds: Iterable[float]) -> tuple[tuple[str, float]
         for specimen in study.specimens
         if specimen.at(speed) is not None
     )
-
-
-def peak(gait: Gait) -> float:
-    """The larger of both legs' peak GRF, in N per pair of legs."""
-    return max(gait.peak_grf.values())
 
 
 def _against_both(
@@ -138,11 +60,13 @@ def _against_both(
     lower: bool,
 ) -> Verdict:
     """A claim that a measure is always lower (or higher) than that of the rigid body."""
-    pair = [_compare(study, measure, baseline) for baseline in (RIGID, LOCKED)]
+    pair = [compare(study, measure, baseline) for baseline in (RIGID, LOCKED)]
     kept = [(c.below if lower else c.above) for c in pair]
     broken = [(c.above if lower else c.below) for c in pair]
     counts = [len(c.ratios) for c in pair]
-    if all(k == n for k, n in zip(kept, counts, strict=True)):
+    if not all(counts):
+        verdict = DEPENDS
+    elif all(k == n for k, n in zip(kept, counts, strict=True)):
         verdict = HOLDS
     elif all(b == n for b, n in zip(broken, counts, strict=True)):
         verdict = FAILS
@@ -168,7 +92,7 @@ def _stiffness(study: SpineStudy) -> Verdict:
     claim = f"peak GRF falls as k_t rises from {low:g} to {high:g} N m/rad"
     falls: list[tuple[float, float, float]] = []
     rises: list[tuple[float, float, float]] = []
-    for speed in _speeds(study):
+    for speed in common_speeds(study):
         points = [specimen.at(speed) for specimen in study.flexible]
         peaks = [peak(point.gait) for point in points if point is not None]
         if len(peaks) < 2:
@@ -335,7 +259,7 @@ def _stability(study: SpineStudy) -> Verdict:
         numbers[f"{sweep.speed:g} m/s"] = entry
     if all(interior) and all(best_of_all) and interior:
         verdict = HOLDS
-    elif not any(interior) and not any(best_of_all):
+    elif interior and not any(interior) and not any(best_of_all):
         verdict = FAILS
     else:
         verdict = DEPENDS
@@ -352,7 +276,7 @@ def _oscillation(study: SpineStudy) -> Verdict:
 
 def _shares(study: SpineStudy) -> Verdict:
     claim = "the spine stores energy and lowers the gravitational share at the apex"
-    speed = study.setting.compared[-1]
+    speed = max(study.setting.compared, default=study.setting.speeds[1])
     told, numbers = [], {}
     stores = []
     specimen: Specimen

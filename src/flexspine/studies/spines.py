@@ -38,6 +38,9 @@ ALMOST_STRAIGHT = 0.05
 
 STIFF_POINTS = 60
 
+# Relative; the presets' gaits are known to this and better.
+SAME = 1e-9
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -173,21 +176,27 @@ def _check(setting: Setting) -> None:
 
 
 def _start(body: str, setting: Setting) -> Gait:
-    """The preset's gait, carried over to the energy and height of the setting."""
+    """The preset's gait, carried over to the energy, the height and the speeds of the setting."""
     gait = examine(load_model(PRESETS[body]))
-    for over, value in (("energy", setting.energy), ("height", setting.height)):
-        here = gait.energy if over == "energy" else gait.model.apex["height"]
-        if abs(here - value) > 1e-9 * value:
-            bounds = (min(here, value), max(here, value))
-            found = trace_branch(gait, over, bounds=bounds, longest_step=STEP)
-            points = found.at(value)
-            if not points:
-                raise ParameterError(
-                    f"{body}: no gait of the published family at {over} = {value:g} "
-                    f"({'; '.join(found.ends)})",
-                    f"give a value nearer to {here:g}",
-                )
-            gait = points[0].gait
+    for over, low, high in (
+        ("energy", setting.energy, setting.energy),
+        ("height", setting.height, setting.height),
+        ("mean_speed", *setting.speeds),
+    ):
+        here = gait.quantities[over]
+        value = min(max(here, low), high)
+        if abs(here - value) <= SAME * value:
+            continue
+        bounds = (min(here, value), max(here, value))
+        found = trace_branch(gait, over, bounds=bounds, longest_step=STEP)
+        points = found.at(value)
+        if not points:
+            raise ParameterError(
+                f"{body}: no gait of the published family at {over} = {value:g} "
+                f"({'; '.join(found.ends)})",
+                f"give a value nearer to {here:g}",
+            )
+        gait = points[0].gait
     return gait
 
 
