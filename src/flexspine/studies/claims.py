@@ -150,7 +150,12 @@ def _gain(study: SpineStudy) -> Verdict:
         numbers[f"{sweep.speed:g} m/s"] = entry
     verdict = HOLDS if holds and all(holds) else FAILS if holds and not any(holds) else DEPENDS
     return Verdict(
-        3, claim, verdict, "; ".join(told), numbers, _runs(study, study.setting.compared)
+        3,
+        claim,
+        verdict,
+        "; ".join(told) or NO_SWEEP,
+        numbers,
+        _runs(study, study.setting.compared),
     )
 
 
@@ -264,7 +269,12 @@ def _stability(study: SpineStudy) -> Verdict:
     else:
         verdict = DEPENDS
     return Verdict(
-        5, claim, verdict, "; ".join(told), numbers, _runs(study, study.setting.compared)
+        5,
+        claim,
+        verdict,
+        "; ".join(told) or NO_SWEEP,
+        numbers,
+        _runs(study, study.setting.compared),
     )
 
 
