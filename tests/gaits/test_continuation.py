@@ -539,3 +539,31 @@ def test_a_damped_stride_is_on_no_branch() -> None:
     damped = examine(load_model("kamimura2015-flexible", DAMPERS))
     with pytest.raises(ParameterError, match="cannot start here; start it from a gait"):
         trace_branch(damped, bounds=(4.0, 5.0), fixed={"height": 0.32})
+
+
+def test_a_doubled_branch_is_found_although_it_leaves_at_a_slant() -> None:
+    """Over stiffness two doublings; each gait there needs both of its strides to return."""
+    gait = examine(load_model("kamimura2015-flexible"))
+    branch = trace_branch(gait, "spine.stiffness", bounds=(100, 300), longest_step=0.1)
+    doublings = [mark for mark in branch.landmarks if mark.kind == "period doubling"]
+    assert [mark.value for mark in doublings] == pytest.approx([159.838, 278.460], abs=1e-3)
+    for mark in doublings:
+        found = switch_branch(branch.family, mark)
+        assert len(found) == 2
+        for doubled in found:
+            assert doubled.strides == 2
+            assert doubled.residual <= 1e-11
+            assert examine(doubled.model).residual > 1e-3
+
+
+def test_the_branch_of_asymmetric_gaits_crosses_where_symmetry_breaks() -> None:
+    gait = examine(load_model("kamimura2015-flexible"))
+    branch = trace_branch(gait, "spine.stiffness", bounds=(130, 300), longest_step=0.1)
+    mark = only(branch, "symmetry breaking")
+    one, other = switch_branch(branch.family, mark)
+    assert one.residual <= 1e-11
+    assert abs(one.touchdown_angles["fore"] + one.liftoff_angles["hind"]) > 1e-5
+    # They are each other's mirror image: the peaks change places.
+    assert one.peak_grf["fore"] == pytest.approx(other.peak_grf["hind"], rel=1e-5)
+    loop = trace_branch(one, "spine.stiffness", bounds=(130, 300), longest_step=0.1)
+    assert loop.ends[0].startswith("closed")

@@ -12,7 +12,7 @@ import pytest
 from flexspine.errors import OutputError, ParameterError
 from flexspine.parameters import values
 from flexspine.studies import tables
-from flexspine.studies.claims import Verdict, verdicts
+from flexspine.studies.claims import verdicts
 from flexspine.studies.spines import (
     FLEXIBLE,
     LOCKED,
@@ -21,6 +21,7 @@ from flexspine.studies.spines import (
     SpineStudy,
     study_spines,
 )
+from flexspine.studies.verdict import Verdict
 from tests import second_implementation as reference
 
 SMALL = Setting(speeds=(4.1, 4.7), stiffnesses=(200.0, 260.0), compared=(4.5,))
@@ -110,9 +111,18 @@ def test_verdicts_name_both_baselines_and_the_runs_behind_them(
     for verdict in judged.values():
         assert verdict.verdict in ("holds", "fails", "depends on")
         assert verdict.runs
+        assert all(gait.confirmed for gait in verdict.runs.values())
     for number in (1, 5, 6, 9):
         assert RIGID in judged[number].finding
         assert "locked spine" in judged[number].finding
+
+
+def test_claims_without_evidence_stay_undecided() -> None:
+    """No speed for the sweeps, and a body alone has nothing to be compared with over k_t."""
+    alone = replace(SMALL, speeds=(4.45, 4.5), stiffnesses=(260.0,), compared=())
+    found = {verdict.number: verdict.verdict for verdict in verdicts(study_spines(alone))}
+    assert [found[number] for number in (2, 3, 4, 5)] == ["undecided"] * 4
+    assert found[1] != "undecided"
 
 
 def test_the_gravitational_share_at_the_apex_is_set_by_height_and_energy(
@@ -171,6 +181,8 @@ def test_branches_of_another_setting_are_not_taken_over(tmp_path: Path) -> None:
         (replace(SMALL, stiffnesses=()), "stiffness"),
         (replace(SMALL, softest=1e7), "1e"),
         (replace(SMALL, energy=400.0), "energy"),
+        (replace(SMALL, compared=(99.0,)), "99"),
+        (replace(SMALL, stiffnesses=(float("nan"),)), "nan"),
     ],
 )
 def test_settings_without_gaits_are_refused_by_name(setting: Setting, named: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 import sys
@@ -22,10 +23,14 @@ from flexspine.errors import ParameterError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from flexspine.studies.claims import Verdict
+    from flexspine.gaits.continuation import Branch
     from flexspine.studies.spines import Setting, SpineStudy
+    from flexspine.studies.verdict import Verdict
 
 UNFINISHED = "branches.unfinished"
+
+# What a study of an earlier setting has left.
+SAVED = re.compile(r"gait-(published-rigid|locked-spine|flexible)-.*at-.*\.json|.*_over_.*\.png")
 
 
 def study(
@@ -79,6 +84,7 @@ def study(
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         store = None if out is None else out / UNFINISHED
+        begun = store is not None and store.exists()
         if store is not None:
             store.mkdir(exist_ok=True)
             stack.callback(_remove_empty, store)
@@ -87,11 +93,11 @@ def study(
             progress.begin("judging the claims")
             judged = verdicts(result)
             if directory is not None and store is not None:
-                with directory.stage() as stage:
+                with directory.stage(SAVED) as stage:
                     _write(stage, result, judged, progress)
                 shutil.rmtree(store)
         except ParameterError:
-            if store is not None:
+            if store is not None and not begun:  # what was begun before is none of this study's
                 shutil.rmtree(store)
             raise
         except KeyboardInterrupt:
@@ -138,30 +144,39 @@ def _write(stage: Path, result: SpineStudy, judged: list[Verdict], progress: Ste
             tables.write_table(rows, stage / f"{name}.{suffix}")
     write_json(_record(result, judged), stage / "study.json")
     (stage / "verdicts.md").write_text(_markdown(result.setting, judged), encoding="utf-8")
+    compared = sorted(set(result.setting.compared))
+    quoted = {name: gait for verdict in judged for name, gait in verdict.runs.items()}
     profiles = {}
     for specimen in result.specimens:
-        for speed in result.setting.compared:
+        for speed in compared:
             point = specimen.at(speed)
             if point is not None:
-                save_gait(point.gait, stage / _file(specimen.label, speed))
+                quoted[specimen.name_at(speed)] = point.gait
                 profiles[specimen.label, speed] = to_dataset(point.gait.run)
+    for name, gait in quoted.items():
+        save_gait(gait, stage / _file(name))
     drawings: dict[str, Callable[[], Figure]] = {
         "peak_grf_over_speed": lambda: figures.plot_peak_grf(gaits, tables.published_readings()),
-        "profiles": lambda: figures.plot_profiles(profiles, result.setting.compared),
-        "energy_shares": lambda: figures.plot_energy_shares(profiles, result.setting.compared[-1]),
         "stability_over_speed": lambda: figures.plot_stability_speed(gaits),
-        "stability_over_stiffness": lambda: figures.plot_stability_stiffness(stiffness),
-        "peak_grf_over_stiffness": lambda: figures.plot_peak_grf_stiffness(stiffness),
     }
+    if stiffness:
+        drawings |= {
+            "stability_over_stiffness": lambda: figures.plot_stability_stiffness(stiffness),
+            "peak_grf_over_stiffness": lambda: figures.plot_peak_grf_stiffness(stiffness),
+        }
+    if profiles:
+        fastest = max(speed for _, speed in profiles)
+        drawings |= {
+            "profiles": lambda: figures.plot_profiles(profiles, compared),
+            "energy_shares": lambda: figures.plot_energy_shares(profiles, fastest),
+        }
     for number, (name, draw) in enumerate(drawings.items()):
         _show(progress, f"drawing {name}", number / len(drawings))
         draw().savefig(stage / f"{name}.png")
 
 
-def _file(label: str, speed: float) -> str:
-    """The file of the gait of a body at a speed."""
-    body = label.replace(" N m/rad", "").replace(", k_t = ", " ").replace(" ", "-")
-    return f"gait-{body}-at-{speed:g}.json"
+def _file(name: str) -> str:
+    return f"gait-{name}.json"
 
 
 def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
@@ -182,10 +197,10 @@ def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
                 "statement": verdict.claim,
                 "verdict": verdict.verdict,
                 "finding": verdict.finding,
-                "numbers": verdict.numbers,
+                "numbers": dict(verdict.numbers),
                 "runs": [
-                    {"body": label, "mean_speed": speed, "gait": _file(label, speed)}
-                    for label, speed in verdict.runs
+                    {"mean_speed": gait.mean_speed, "gait": _file(name)}
+                    for name, gait in verdict.runs.items()
                 ],
             }
             for verdict in judged
@@ -195,8 +210,7 @@ def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
                 "body": specimen.body,
                 "spine_stiffness": specimen.stiffness,
                 "gaits": len(specimen.branch.points),
-                "mean_speed": [specimen.branch.points[i].value for i in (0, -1)],
-                "ends": list(specimen.branch.ends),
+                "ends": _ends(specimen.branch),
             }
             for specimen in result.specimens
         ],
@@ -204,13 +218,20 @@ def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
             {
                 "mean_speed": sweep.speed,
                 "gaits": len(sweep.branch.points),
-                "spine_stiffness": [sweep.branch.points[i].value for i in (0, -1)],
-                "ends": list(sweep.branch.ends),
+                "ends": _ends(sweep.branch),
                 "next_to_locked": len(sweep.stiff),
             }
             for sweep in result.sweeps
         ],
     }
+
+
+def _ends(branch: Branch) -> list[dict[str, Any]]:
+    points = branch.points[0], branch.points[-1]
+    return [
+        {branch.over: point.value, "reason": reason}
+        for point, reason in zip(points, branch.ends, strict=True)
+    ]
 
 
 def _markdown(setting: Setting, judged: list[Verdict]) -> str:
@@ -226,8 +247,8 @@ def _markdown(setting: Setting, judged: list[Verdict]) -> str:
     for verdict in judged:
         lines += [f"## {verdict.number}. {verdict.claim[0].upper()}{verdict.claim[1:]}", ""]
         lines += [f"**{verdict.verdict}**: {verdict.finding}.", ""]
-        files = ", ".join(f"`{_file(label, speed)}`" for label, speed in verdict.runs)
-        lines += [f"Runs: {files}; all gaits are in `gaits.csv` and `stiffness.csv`.", ""]
+        runs = ", ".join(f"`{_file(name)}`" for name in verdict.runs) or "none"
+        lines += [f"Gaits quoted: {runs}; all are in `gaits.csv` and `stiffness.csv`.", ""]
     return "\n".join(lines)
 
 

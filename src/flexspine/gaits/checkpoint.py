@@ -29,10 +29,15 @@ class Checkpoint:
         self.path = path
         self._lines: list[dict[str, Any]] = []
         header = json.loads(json.dumps(description))
-        if path.exists():
-            self._read(header)
-        else:
-            path.write_text(json.dumps(header) + "\n", encoding="utf-8")
+        try:
+            if path.exists():
+                self._read(header)
+            else:
+                path.write_text(json.dumps(header) + "\n", encoding="utf-8")
+        except OSError as failure:
+            raise OutputError(
+                f"cannot use '{path}' ({failure.strerror})", "give another place"
+            ) from None
 
     def _read(self, header: dict[str, Any]) -> None:
         rest = ""
@@ -43,7 +48,7 @@ class Checkpoint:
             first, lines = None, []
         if first != header or not all(line.keys() >= KEYS for line in lines):
             raise OutputError(
-                f"'{self.path}' holds a branch that was traced with other settings",
+                f"'{self.path}' is damaged, or holds a branch that was traced with other settings",
                 "give another place, or delete it to begin anew",
             )
         if rest:
@@ -81,6 +86,13 @@ class Checkpoint:
             ]
             step, end = line["step"], line["end"]
         return Tracing(tuple(points), tuple(marks), step, end)
+
+
+def _is_step(line: Any) -> bool:
+    if not (isinstance(line, dict) and line.keys() >= KEYS):
+        return False
+    items = [*line["points"], *(mark.get("at") for mark in line["marks"])]
+    return all(isinstance(item, dict) and {"point", "tangent"} <= item.keys() for item in items)
 
 
 def _plain(point: BranchPoint) -> dict[str, list[float]]:

@@ -69,7 +69,7 @@ def trace_branch(
     symmetric: bool | None = None,
     longest_step: float = LONGEST_STEP,
     most_points: int = MOST_POINTS,
-    store: Path | None = None,
+    store: str | Path | None = None,
     progress: Callable[[BranchPoint], None] = lambda _: None,
 ) -> Branch:
     """Follow the branch of a gait in ``over`` both ways, until it ends or leaves ``bounds``.
@@ -88,7 +88,7 @@ def trace_branch(
     checkpoint = None
     if store is not None:
         settings = {"bounds": bounds, "longest_step": longest_step, "most_points": most_points}
-        checkpoint = Checkpoint(store, {**_description(family, gait), **settings})
+        checkpoint = Checkpoint(Path(store), {**_description(family, gait), **settings})
     halves: list[Tracing] = []
     for way in (-1, 1):
         tracing = Tracing((start if way > 0 else start.turned(),))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 from typing import Any
 
-from flexspine.errors import InputError, PresetError
+from flexspine.errors import InputError, OutputError, PresetError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.gait_record import gait_record
 from flexspine.models.model import Model, Source
@@ -14,13 +15,26 @@ from flexspine.models.registry import find_kind
 from flexspine.models.simulation import DEFAULT_TOLERANCE
 from flexspine.parameters import build
 
+# Period doubling leads to a few strides per period, never to this many.
+MOST_STRIDES = 64
+
 NEEDED = ("model", "parameters", "apex", "touchdown_angles")
 
 
 def save_gait(gait: Gait, path: str | Path) -> None:
-    """Write a gait to a JSON file that `load_gait` and ``flexspine bound --gait`` take."""
+    """Write a gait to a JSON file that `load_gait` and ``flexspine bound --gait`` take.
+
+    Raises `OutputError`.
+    """
     text = json.dumps(gait_record(gait), indent=2, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    try:
+        Path(path).write_text(text + "\n", encoding="utf-8")
+    except OSError as failure:
+        if failure.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise  # the machine's failure, not the caller's
+        raise OutputError(
+            f"cannot write '{path}' ({failure.strerror})", "give another path"
+        ) from None
 
 
 def load_gait(path: str | Path) -> Gait:
@@ -42,17 +56,14 @@ def load_gait(path: str | Path) -> Gait:
         strides = record.get("strides", 1)
         if not (isinstance(strides, int) and 1 <= strides <= MOST_STRIDES):
             raise PresetError(f"{strides} strides", f"give 1 to {MOST_STRIDES}")
-        return examine(model, strides=strides, tolerance=DEFAULT_TOLERANCE)
+        tolerance = record.get("tolerance", DEFAULT_TOLERANCE)
+        return examine(model, strides=strides, tolerance=tolerance)
     except InputError as failure:
         raise PresetError(f"'{path}': {failure.message}", failure.remedy) from None
     except (TypeError, AttributeError):
         raise PresetError(
             f"'{path}' is not a gait", "give a file written by 'flexspine gait --out'"
         ) from None
-
-
-# Period doubling leads to a few strides per period, never to this many.
-MOST_STRIDES = 64
 
 
 def _parse(path: str) -> Any:

@@ -15,7 +15,7 @@ from flexspine.hybrid.sensitivity import Deviation, propagate
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import Trajectory
 from flexspine.models.model import Model
-from flexspine.models.simulation import DEFAULT_TOLERANCE
+from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ def stride_map(
     `UnknownNameError`, and `ParameterError` for a run that does not come back.
     """
     names = model.parameter_names
+    check_count("strides", strides)
     for name in parameters:
         if name not in names:
             raise UnknownNameError("parameter", name, names)

@@ -17,7 +17,7 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
 from flexspine.models.simulation import DEFAULT_TOLERANCE
-from flexspine.parameters import values
+from flexspine.parameters import is_number, values
 
 # Natural units; gaits closer than this are one.
 DISTINCT = 1e-6
@@ -93,8 +93,8 @@ def find_gaits(
     gait. ``free`` are parameters that become unknown too, with the range to start in. A
     ``symmetric`` gait is its own mirror image in time; None looks for symmetric and general ones.
     ``bounds`` narrow or widen where unknowns may lie. SI and radians. The same seed finds the same
-    gaits. Raises `UnknownNameError`, and `ParameterError` where the fixed quantities leave no
-    gait alone.
+    gaits. Raises `UnknownNameError`, and `ParameterError` where the fixed quantities do not
+    single out isolated gaits.
     """
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
     ranges = {**(bounds or {}), **(free or {})}
@@ -133,6 +133,8 @@ def _check_request(
 ) -> None:
     given = values(model.parameters)
     for name, (low, high) in free.items():
+        if not (is_number(low) and is_number(high)):
+            raise ParameterError(f"'{name}' from {low} to {high} is no range", "give two numbers")
         if low <= 0 < given.get(name, 0.0):
             raise ParameterError(
                 f"'{name}' from {low:g} to {high:g} would vanish", "give a range above zero"

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from flexspine.errors import ParameterError
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.return_map import ReturnMap, linearize, section_rows
 from flexspine.hybrid.compile import Array
@@ -88,8 +89,13 @@ def floquet_multipliers(gait: Gait, linear: ReturnMap | None = None) -> Stabilit
     """Linearise the stride map of a gait exactly and take its eigenvalues.
 
     Variational equations between events, saltation at them. Touchdown angles are held fixed.
-    ``linear`` spares linearising its trajectory anew.
+    ``linear`` spares linearising its trajectory anew. Raises `ParameterError` for what is no gait.
     """
+    if gait.flaw is not None:
+        raise ParameterError(
+            f"there is no gait to linearise: {gait.flaw}",
+            "find one first; stride_map differentiates any stride",
+        )
     section = gait.model.system.section
     result = linear or linearize(gait.trajectory)
     jacobian = result.by_state

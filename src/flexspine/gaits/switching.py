@@ -6,7 +6,7 @@ import numpy as np
 
 from flexspine.errors import ParameterError
 from flexspine.gaits.family import BRANCHING, DOUBLING, BranchPoint, Family
-from flexspine.gaits.gait import Gait
+from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.landmarks import SYMMETRY_BREAKING, Landmark
 from flexspine.gaits.newton import Slice
 from flexspine.gaits.problem import Problem
@@ -17,8 +17,11 @@ from flexspine.hybrid.integrate import integrate
 # Natural units; how far from the crossing the other branch is looked for, in turn.
 DISTANCES = (0.01, 0.003, 0.03, 0.001)
 
-# Of the distance; a solution closer than this to the old branch is on it.
-OFF = 0.5
+# Of the distance; a solution further than this from where it was looked for is another one.
+NEAR = 3.0
+
+# Natural units; an orbit that misses its start by more after half its strides needs them all.
+DOUBLED = 1e-6
 
 
 def switch_branch(family: Family, landmark: Landmark) -> list[Gait]:
@@ -51,13 +54,22 @@ def switch_branch(family: Family, landmark: Landmark) -> list[Gait]:
         for distance in DISTANCES:
             guess = point + sign * distance * across
             attempt = general.correct(guess, Slice(across, guess))
-            near = np.linalg.norm(attempt.point - guess) < OFF * distance
+            near = np.linalg.norm(attempt.point - guess) < NEAR * distance
             if attempt.solved and near:
                 gait = general.gait(attempt.point)
-                if gait.flaw is None:
+                if gait.flaw is None and _is_new(gait, landmark, old.strides):
                     found.append(gait)
                     break
     return found
+
+
+def _is_new(gait: Gait, landmark: Landmark, strides: int) -> bool:
+    """Whether a gait is off the branch that the landmark is on."""
+    if landmark.kind == SYMMETRY_BREAKING:
+        return not gait.symmetric
+    if landmark.kind == DOUBLING:
+        return examine(gait.model, strides=strides).residual > DOUBLED
+    return True  # it lies across the branch, by the slice on which it was found
 
 
 def _across(general: Family, family: Family, crossing: BranchPoint) -> Array:

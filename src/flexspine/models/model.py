@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import pi
+from math import inf, pi
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,9 @@ from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import BounderKind
 from flexspine.models.legs import SIDES, phase_of
 from flexspine.parameters import ParameterSet, is_number, replaced, shortened, values
+
+# Below the first, rounding exceeds the truncation; above the second, nothing said here holds.
+TOLERANCES = (1e-17, 1e-3)
 
 # SI; beyond this no start or angle means anything, and squares of it still fit a double.
 LARGEST_START = 1e6
@@ -161,7 +164,11 @@ class Model:
         )
 
     def bind(self, tolerance: float) -> BoundSystem:
-        """Compile the system for a tolerance and give it this model's numbers."""
+        """Compile the system for a tolerance and give it this model's numbers.
+
+        Raises `ParameterError` for a tolerance that is not usable.
+        """
+        tolerance = check_between("tolerance", tolerance, *TOLERANCES)
         return BoundSystem(compile_system(self.system, tolerance), self.parameter_vector)
 
     def apex_state(self) -> HybridState:
@@ -204,3 +211,13 @@ def _check_numbers(kind: str, given: Mapping[str, Any], known: Collection[str]) 
     for name in known:
         if name not in given:
             raise ParameterError(f"{kind} '{name}' has no value", f"give it, e.g. {name}=...")
+
+
+def check_between(name: str, value: float, low: float, high: float) -> float:
+    """Return a number with low < value < high. Raises `ParameterError` for anything else."""
+    if not (is_number(value) and low < value < high):
+        between = f"above {low:g}" + (f" and below {high:g}" if high < inf else "")
+        raise ParameterError(
+            f"{name} = {shortened(value)} is not usable", f"give a number {between}"
+        )
+    return float(value)

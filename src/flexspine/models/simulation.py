@@ -13,14 +13,11 @@ from flexspine.hybrid.integrate import MAX_STEPS, ZERO, integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
-from flexspine.models.model import Model
+from flexspine.models.model import Model, check_between
 from flexspine.parameters import is_number, shortened
 
 # Taylor truncation error per step; strides then repeat to some 1e-13.
 DEFAULT_TOLERANCE = 1e-12
-
-# Below the first, rounding exceeds the truncation; above the second, nothing said here holds.
-TOLERANCES = (1e-17, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -84,38 +81,29 @@ def simulate(
         raise ParameterError("both strides and duration are given", "give one of them")
     if toes and state is None:
         raise ParameterError("toes are given without a state", "give the state they belong to")
-    wanted = _count("strides", 1 if strides is None else strides)
-    end = inf if duration is None else _number("duration", duration, 0, inf)
+    wanted = check_count("strides", 1 if strides is None else strides)
+    end = inf if duration is None else check_between("duration", duration, 0, inf)
     start = model.apex_state() if state is None else model.state(state, toes)
-    bound = model.bind(_number("tolerance", tolerance, *TOLERANCES))
+    bound = model.bind(tolerance)
     _refuse_impossible(bound, start)
     trajectory = integrate(
         bound,
         start,
         end_time=end,
         crossings=wanted if duration is None else None,
-        max_steps=_count("max_steps", max_steps),
+        max_steps=check_count("max_steps", max_steps),
         record=True,
     )
     return Run(model, trajectory, tolerance)
 
 
-def _count(name: str, value: int) -> int:
+def check_count(name: str, value: int) -> int:
+    """Return a whole number from 1 on. Raises `ParameterError` for anything else."""
     if not (is_number(value) and isinstance(value, Integral) and value >= 1):
         raise ParameterError(
             f"{name} = {shortened(value)} is not usable", "give a whole number from 1 on"
         )
     return int(value)
-
-
-def _number(name: str, value: float, low: float, high: float) -> float:
-    """Check that low < value < high."""
-    if not (is_number(value) and low < value < high):
-        between = f"above {low:g}" + (f" and below {high:g}" if high < inf else "")
-        raise ParameterError(
-            f"{name} = {shortened(value)} is not usable", f"give a number {between}"
-        )
-    return float(value)
 
 
 def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:

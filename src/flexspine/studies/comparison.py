@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexspine.gaits.gait import Gait
-from flexspine.studies.spines import SpineStudy
+from flexspine.studies.spines import FLEXIBLE, SpineStudy
 
 # Relative; smaller differences are none.
 NO_DIFFERENCE = 1e-3
@@ -56,6 +56,18 @@ class Comparison:
             f"to {r1:.3f} (k_t = {k1:g}, {v1:.2f} m/s), lower in {self.below} and higher in "
             f"{self.above} of {len(self.ratios)} pairs"
         )
+
+    def quoted(self, study: SpineStudy) -> dict[str, Gait]:
+        """The gaits whose ratios are told, by name."""
+        if not self.ratios:
+            return {}
+        found = {}
+        for stiffness, speed, _ in (self.lowest, self.highest):
+            for specimen in (study.specimen(FLEXIBLE, stiffness), study.specimen(self.baseline)):
+                point = specimen.at(speed)
+                if point is not None:
+                    found[specimen.name_at(speed)] = point.gait
+        return found
 
     @property
     def numbers(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,12 @@ class Specimen:
         if self.stiffness is None:
             return self.body
         return f"{self.body}, k_t = {self.stiffness:g} N m/rad"
+
+    def name_at(self, speed: float) -> str:
+        """The name of its gait at a mean speed, such as ``flexible-260-at-4.5``."""
+        body = self.body.replace(" ", "-")
+        which = body if self.stiffness is None else f"{body}-{self.stiffness:g}"
+        return f"{which}-at-{speed:g}"
 
     def at(self, speed: float) -> BranchPoint | None:
         """The gait at a mean speed, the first from the slow end where the branch folds."""
@@ -143,7 +150,7 @@ def study_spines(
     across = (
         trace(flexible, "spine.stiffness", (low, high), "over stiffness") if low < high else None
     )
-    for stiffness in sorted(setting.stiffnesses):
+    for stiffness in sorted(set(setting.stiffnesses)):
         found = [] if across is None else across.at(stiffness)
         gait = found[0].gait if found else flexible if stiffness == own else None
         if gait is None:
@@ -157,7 +164,9 @@ def study_spines(
         specimens.append(Specimen(FLEXIBLE, stiffness, branch))
     study = SpineStudy(setting, tuple(specimens), ())
     sweeps = [
-        sweep for speed in setting.compared if (sweep := _sweep(study, speed, trace)) is not None
+        sweep
+        for speed in sorted(set(setting.compared))
+        if (sweep := _sweep(study, speed, trace)) is not None
     ]
     return SpineStudy(setting, tuple(specimens), tuple(sweeps))
 
@@ -168,6 +177,17 @@ def _check(setting: Setting) -> None:
         raise ParameterError(f"speeds {low:g} to {high:g} are no range", "give low before high")
     if not setting.stiffnesses:
         raise ParameterError("no stiffness is given", "give at least one")
+    for stiffness in setting.stiffnesses:
+        if not 0 < stiffness < inf:
+            raise ParameterError(
+                f"stiffness {stiffness:g} is not usable", "give a number above zero, in N m/rad"
+            )
+    for speed in setting.compared:
+        if not low <= speed <= high:
+            raise ParameterError(
+                f"speed {speed:g} to compare at is not within {low:g} to {high:g}",
+                "give one within the speeds",
+            )
     if not 0 < setting.softest < setting.stiffest:
         raise ParameterError(
             f"stiffnesses {setting.softest:g} to {setting.stiffest:g} are no range",

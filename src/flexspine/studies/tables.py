@@ -24,7 +24,7 @@ def gait_row(gait: Gait, stability: Stability) -> Row:
     return {
         "mean_speed": gait.mean_speed,
         "energy": gait.energy,
-        "apex_height": gait.model.apex["height"],
+        **{f"apex_{name}": value for name, value in _apex(gait).items()},
         "phases": "-".join(gait.phases),
         "family": gait.family,
         **{f"peak_grf_{side}": gait.peak_grf[side] for side in SIDES},
@@ -35,6 +35,7 @@ def gait_row(gait: Gait, stability: Stability) -> Row:
         **{f"duty_factor_{side}": duty.get(side) for side in SIDES},
         **{f"apex_share_{kind}": gait.apex_energy_shares[kind] for kind in ENERGIES},
         **{f"mean_share_{kind}": gait.mean_energy_shares[kind] for kind in ENERGIES},
+        "floquet_multipliers": " ".join(f"{value:.12g}" for value in stability.multipliers),
         "spectral_radius": stability.spectral_radius,
         "level_spectral_radius": stability.level_spectral_radius,
         "stable": stability.stable,
@@ -44,6 +45,14 @@ def gait_row(gait: Gait, stability: Stability) -> Row:
         **{f"touchdown_{side}": gait.touchdown_angles[side] for side in SIDES},
         **{f"liftoff_{side}": gait.liftoff_angles[side] for side in SIDES},
     }
+
+
+def _apex(gait: Gait) -> dict[str, float]:
+    """The apex, with a rigid body's pitch as that of both its ends, so that all rows are alike."""
+    apex = gait.model.apex
+    names = ("height", "speed", *(f"{side}_pitch" for side in SIDES))
+    names += tuple(f"{side}_pitch_rate" for side in SIDES)
+    return {n: apex[n] if n in apex else apex[n.partition("_")[2]] for n in names}
 
 
 def gaits_table(study: SpineStudy) -> list[Row]:
