@@ -14,9 +14,13 @@ A run that merely ends badly (it fell) raises nothing: that is an `Outcome`.
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import ClassVar
+
+# What the system says of a full disk: the machine's failure, not the caller's.
+OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
 class FlexspineError(Exception):

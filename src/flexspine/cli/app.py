@@ -14,8 +14,7 @@ import typer
 from flexspine._version import __version__
 from flexspine.cli import bound, branch, cache, equations, gait, presets, study
 from flexspine.cli.output import fail
-from flexspine.cli.results import OUT_OF_SPACE
-from flexspine.errors import FlexspineError, InputError, MachineError
+from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
 
 INTERRUPTED = 130
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import re
 import shutil
@@ -13,12 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from flexspine.cli.output import Steps
-from flexspine.errors import OutputError
+from flexspine.errors import OUT_OF_SPACE, OutputError
 
 if TYPE_CHECKING:
     from flexspine.models.simulation import Run
-
-OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 ANIMATIONS = ("animation.mp4", "animation.gif")
 PICTURES = re.compile("|".join(map(re.escape, ("figure.png", "strip.png", *ANIMATIONS))))

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from flexspine.errors import OutputError
+from flexspine.errors import OUT_OF_SPACE, OutputError
 from flexspine.gaits.family import BranchPoint, Family
 from flexspine.gaits.landmarks import Landmark
 from flexspine.gaits.newton import Attempt
 from flexspine.gaits.tracing import Tracing
 
-KEYS = {"way", "points", "marks", "step", "end"}
+KEYS = {"way", "points", "count", "marks", "step", "end"}
 
 
 class Checkpoint:
@@ -35,6 +35,8 @@ class Checkpoint:
             else:
                 path.write_text(json.dumps(header) + "\n", encoding="utf-8")
         except OSError as failure:
+            if failure.errno in OUT_OF_SPACE:
+                raise
             raise OutputError(
                 f"cannot use '{path}' ({failure.strerror})", "give another place"
             ) from None
@@ -46,7 +48,7 @@ class Checkpoint:
             first, *lines = [json.loads(line) for line in whole.splitlines()] or [None]
         except ValueError:
             first, lines = None, []
-        if first != header or not all(line.keys() >= KEYS for line in lines):
+        if first != header or not all(map(_is_step, lines)):
             raise OutputError(
                 f"'{self.path}' is damaged, or holds a branch that was traced with other settings",
                 "give another place, or delete it to begin anew",
@@ -60,6 +62,7 @@ class Checkpoint:
         line = {
             "way": way,
             "points": [_plain(p) for p in after.points[len(before.points) :]],
+            "count": len(after.points),  # the last step may take back a point
             "marks": [
                 {"kind": mark.kind, "detail": mark.detail, "at": _plain(mark.at)}
                 for mark in after.marks[len(before.marks) :]
@@ -80,6 +83,7 @@ class Checkpoint:
             if line["way"] != way:
                 continue
             points += [_revived(family, item) for item in line["points"]]
+            del points[line["count"] :]
             marks += [
                 Landmark(item["kind"], item["detail"], _revived(family, item["at"]))
                 for item in line["marks"]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import json
 from pathlib import Path
 from typing import Any
 
-from flexspine.errors import InputError, OutputError, PresetError
+from flexspine.errors import OUT_OF_SPACE, InputError, OutputError, PresetError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.gait_record import gait_record
 from flexspine.models.model import Model, Source
@@ -30,8 +29,8 @@ def save_gait(gait: Gait, path: str | Path) -> None:
     try:
         Path(path).write_text(text + "\n", encoding="utf-8")
     except OSError as failure:
-        if failure.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise  # the machine's failure, not the caller's
+        if failure.errno in OUT_OF_SPACE:
+            raise
         raise OutputError(
             f"cannot write '{path}' ({failure.strerror})", "give another path"
         ) from None
