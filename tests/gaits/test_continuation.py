@@ -325,7 +325,7 @@ def test_gaits_at_a_value_have_exactly_this_value(branches: dict[str, Branch]) -
 
 
 def test_the_branch_over_stiffness_ends_on_its_bounds(softer: Branch) -> None:
-    stiffnesses = [p.gait.model.parameters.spine.stiffness for p in softer.points]  # type: ignore[attr-defined]
+    stiffnesses = [p.gait.model.numbers["spine.stiffness"] for p in softer.points]
     assert stiffnesses == sorted(stiffnesses)
     assert (stiffnesses[0], stiffnesses[-1]) == pytest.approx((200, 260), abs=1e-9)
     assert softer.ends == ("reached spine.stiffness = 200", "reached spine.stiffness = 260")

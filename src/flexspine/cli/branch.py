@@ -197,9 +197,7 @@ def _distance(one: Gait, other: Gait) -> float:
 
 def _value(start: Gait, over: str) -> float:
     """The value of a quantity or parameter. Raises `UnknownNameError`."""
-    from flexspine.parameters import values
-
-    known = _quantities(start) | values(start.model.parameters)
+    known = {**start.model.numbers, **start.quantities}
     if over not in known:
         raise UnknownNameError("quantity or parameter", over, known)
     return known[over]

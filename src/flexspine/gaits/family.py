@@ -8,7 +8,6 @@ from itertools import combinations
 
 import numpy as np
 
-from flexspine.errors import ParameterError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.newton import Attempt, Slice, solve
 from flexspine.gaits.problem import ANGLES, Problem
@@ -16,7 +15,6 @@ from flexspine.gaits.return_map import ReturnMap, linearize, section_rows
 from flexspine.gaits.stability import Stability, floquet_multipliers
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
-from flexspine.parameters import values
 
 # Iterations of a corrector; one that needs more has started too far away.
 CORRECTOR_ITERATIONS = 8
@@ -109,9 +107,7 @@ class Family:
 
     def value(self, gait: Gait) -> float:
         """The value of ``over``, SI."""
-        if self.over in ("mean_speed", "energy"):
-            return self.problem.measure(gait.trajectory, self.over)
-        return value_of(gait, self.over)
+        return {**gait.model.numbers, **gait.quantities}[self.over]
 
     def general_matrix(self, returned: ReturnMap) -> Array:
         """The equations of a general gait at a gait of the family, symmetric or not.
@@ -167,19 +163,6 @@ class Family:
         along = self.general_direction(tangent, returned.trajectory.bound.parameters)
         bordered = np.vstack([matrix, along / np.linalg.norm(along)])
         return float(np.linalg.det(bordered))
-
-
-def value_of(gait: Gait, name: str) -> float:
-    """The value of an apex coordinate, touchdown angle or parameter of a gait, SI."""
-    model = gait.model
-    table = {
-        **model.apex,
-        **{f"touchdown.{side}": angle for side, angle in model.touchdown.items()},
-        **values(model.parameters),
-    }
-    if name not in table:
-        raise ParameterError(f"a gait has no '{name}'", f"known: {', '.join(table)}")
-    return table[name]
 
 
 def _circle(stability: Stability) -> dict[str, float]:

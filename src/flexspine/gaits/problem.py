@@ -216,12 +216,7 @@ class Problem:
 
     def point(self, model: Model) -> Array:
         """Return the vector that describes a model's apex, touchdown angles and parameters."""
-        given = {
-            **model.apex,
-            **{f"touchdown.{side}": angle for side, angle in model.touchdown.items()},
-            **values(model.parameters),
-        }
-        return np.array([self.coordinate(name, given[name]) for name in self.unknowns])
+        return np.array([self.coordinate(name, model.numbers[name]) for name in self.unknowns])
 
     def values(self, point: Array) -> dict[str, float]:
         """Return apex, touchdown angles and free parameters of a point, by name."""

@@ -121,6 +121,12 @@ class Model:
         return (*self.kind.body(False).parameters, *(f"touchdown.{side}" for side in SIDES))
 
     @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Every value by name: apex coordinates, touchdown angles and parameters."""
+        angles = {f"touchdown.{side}": angle for side, angle in self.touchdown.items()}
+        return {**self.apex, **angles, **values(self.parameters)}
+
+    @cached_property
     def alike(self) -> bool:
         """Whether the fore and the hind end have the same parameters."""
         given = values(self.parameters)

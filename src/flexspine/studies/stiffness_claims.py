@@ -56,7 +56,6 @@ def _radius(point: BranchPoint) -> float:
 
 
 def _force(point: BranchPoint) -> float:
-    # The very end of a branch grazes, and is left out of it if its forces are not known.
     return peak(point.gait)
 
 
