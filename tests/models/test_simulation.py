@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,9 +33,9 @@ from flexspine.errors import InputError, ParameterError, StateError
     ],
     ids=str,
 )
-def test_wrong_arguments_are_refused_by_name(flexible: Model, options: dict[str, object]) -> None:
+def test_wrong_arguments_are_refused_by_name(flexible: Model, options: dict[str, Any]) -> None:
     with pytest.raises(InputError) as refused:
-        simulate(flexible, **options)  # type: ignore[arg-type]
+        simulate(flexible, **options)
     assert refused.value.remedy
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.text import Text
 from PIL import Image
 
 from flexspine import Model, animate, load_model, plot_run, simulate, strip, to_dataset
 from flexspine.errors import InputError
+from tests.report.layout import assert_no_text_overlaps
 
 
 @pytest.fixture(scope="module")
@@ -47,26 +45,7 @@ def test_the_figure_draws_the_data(data: xr.Dataset) -> None:
 
 def test_no_text_of_a_figure_runs_over_another(preset: Model) -> None:
     figure = plot_run(to_dataset(simulate(preset, strides=3)))
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    renderer = canvas.get_renderer()
-    unseen = {
-        id(tick.label1)
-        for axes in figure.axes
-        for axis in (axes.xaxis, axes.yaxis)
-        for tick in axis.get_major_ticks()
-        if not min(axis.get_view_interval()) <= tick.get_loc() <= max(axis.get_view_interval())
-    }
-    texts = [
-        text
-        for text in figure.findobj(Text)
-        if text.get_visible() and text.get_text().strip() and id(text) not in unseen
-    ]
-    boxes = [(t.get_text(), t.get_window_extent(renderer)) for t in texts]
-    for (one, a), (two, b) in itertools.combinations(boxes, 2):
-        width = min(a.x1, b.x1) - max(a.x0, b.x0)
-        height = min(a.y1, b.y1) - max(a.y0, b.y0)
-        assert not (width > 2 and height > 2), f"{one!r} runs over {two!r}"
+    assert_no_text_overlaps(figure)
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import json
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -27,6 +25,7 @@ from flexspine.report.study_figures import (
     plot_stability_speed,
     plot_stability_stiffness,
 )
+from tests.report.layout import assert_no_text_overlaps, text_boxes
 
 Row = dict[str, Any]
 Profiles = dict[tuple[str, float], xr.Dataset]
@@ -287,26 +286,8 @@ def test_every_title_says_what_the_numbers_are_of(drawn: dict[str, Figure]) -> N
 
 def test_no_text_runs_over_another(drawn: dict[str, Figure]) -> None:
     for name, figure in drawn.items():
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        renderer = canvas.get_renderer()
-        unseen = {
-            id(tick.label1)
-            for axes in figure.axes
-            for axis in (axes.xaxis, axes.yaxis)
-            for tick in axis.get_major_ticks()
-            if not min(axis.get_view_interval()) <= tick.get_loc() <= max(axis.get_view_interval())
-        }
-        boxes = [
-            (text.get_text(), text.get_window_extent(renderer))
-            for text in figure.findobj(Text)
-            if text.get_visible() and text.get_text().strip() and id(text) not in unseen
-        ]
-        for (one, a), (two, b) in itertools.combinations(boxes, 2):
-            width = min(a.x1, b.x1) - max(a.x0, b.x0)
-            height = min(a.y1, b.y1) - max(a.y0, b.y0)
-            assert not (width > 2 and height > 2), f"{name}: {one!r} runs over {two!r}"
-        for text, box in boxes:
+        assert_no_text_overlaps(figure)
+        for text, box in text_boxes(figure):
             assert box.x0 >= 0, f"{name}: {text!r} leaves the figure"
             assert box.x1 <= figure.bbox.width + 1, f"{name}: {text!r} leaves the figure"
 
