@@ -82,3 +82,14 @@ def test_a_trace_of_other_settings_is_left_as_it_is(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="other settings"):
         trace_branch(gait, bounds=(4.4, 4.55), store=store)
     assert store.read_text() == text
+
+
+def test_a_point_that_the_last_step_took_back_stays_away(tmp_path: Path) -> None:
+    gait, store = examine(load_model("kamimura2015-rigid")), tmp_path / "trace.jsonl"
+    whole = trace_branch(gait, bounds=BOUNDS, store=store)
+    header, *lines = [json.loads(line) for line in store.read_text().splitlines()]
+    assert lines[-1]["way"] == 1
+    lines[-1]["count"] -= 1
+    store.write_text("".join(json.dumps(line) + "\n" for line in (header, *lines)))
+    resumed = trace_branch(gait, bounds=BOUNDS, store=store)
+    assert len(resumed.points) == len(whole.points) - 1
