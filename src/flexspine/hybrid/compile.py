@@ -146,17 +146,14 @@ class CompiledSystem:
     def _event_kernel(self, mode: Mode) -> tuple[Any, tuple[Jump, ...]]:
         system = self.system
         n, m = len(system.states), len(system.held)
-        now = {**self._states, **self._held}
-        lower = self._plain(mode.definitions)
-        outputs = self._guards_and_rates(mode, now)
+        outputs = self._guards_and_rates(mode, {**self._states, **self._held})
         jumps: list[Jump] = []
         for i, guard in enumerate(mode.guards):
             target = system.mode(guard.target or mode.name)
             at = len(outputs)
             if guard.jumps:
-                after = now | {symbol: lower(value) for symbol, value in guard.resets.items()}
-                outputs += [after[s] for s in (*system.states, *system.held)]
-                outputs += self._guards_and_rates(target, after)
+                point, pairs = self.after(mode, guard)
+                outputs += [*point, *pairs]
             jumps.append(
                 Jump(
                     guard=guard,
@@ -172,13 +169,34 @@ class CompiledSystem:
             )
         return compile_expressions(outputs, self._variables), tuple(jumps)
 
+    def after(self, mode: Mode, guard: Guard) -> tuple[list[Any], list[Any]]:
+        """States and held variables after a jump, and the guards of its target there with rates.
+
+        Held variables and then parameters are ``par[...]``, here and in `with_rates`.
+        """
+        lower = self._plain(mode.definitions)
+        resets = {symbol: lower(value) for symbol, value in guard.resets.items()}
+        point = {**self._states, **self._held, **resets}
+        target = self.system.mode(guard.target or mode.name)
+        return list(point.values()), self._guards_and_rates(target, point)
+
+    def with_rates(self, mode: Mode, expressions: list[sp.Expr]) -> tuple[list[Any], list[Any]]:
+        """Expressions and their rates along a mode's field, in turn, and the states in them."""
+        now = {**self._states, **self._held}
+        return self._and_rates(mode, expressions, now), self._variables
+
     def _guards_and_rates(self, mode: Mode, at: Mapping[sp.Symbol, Any]) -> list[Any]:
-        """Each guard's value and its rate along the field, at the given values of the variables."""
+        return self._and_rates(mode, [guard.expression for guard in mode.guards], at)
+
+    def _and_rates(
+        self, mode: Mode, expressions: list[sp.Expr], at: Mapping[sp.Symbol, Any]
+    ) -> list[Any]:
+        """Each expression's value and rate along the field, at these values of the variables."""
         lower = self._plain(mode.definitions)
         field = [lower(mode.field[symbol]) for symbol in self._states]
         pairs: list[Any] = []
-        for guard in mode.guards:
-            value = lower(guard.expression)
+        for expression in expressions:
+            value = lower(expression)
             slope = hy.sum(
                 [hy.diff(value, s) * f for s, f in zip(self._variables, field, strict=True)]
             )

@@ -103,7 +103,8 @@ class HybridSystem:
     """A hybrid system.
 
     ``states`` flow, ``held`` variables change only at events, ``parameters`` not at all during a
-    run. ``mode`` builds the named mode when it is first needed.
+    run. ``mode`` builds the named mode when it is first needed. ``tracked`` names observables
+    whose largest values are worth keeping of a run of which nothing else is kept.
     """
 
     name: str
@@ -114,6 +115,7 @@ class HybridSystem:
     mode: Callable[[str], Mode]
     section: Section
     reversal: Reversal | None = None
+    tracked: tuple[str, ...] = ()
 
     @cached_property
     def places(self) -> dict[sp.Symbol, int]:

@@ -173,6 +173,7 @@ def bounder_system(name: str, body: Body, damped_legs: bool) -> HybridSystem:
             conserved=("energy",) if conservative else (),
         ),
         reversal=_reversal(body) if conservative else None,
+        tracked=tuple(f"{side}_grf" for side in SIDES),
     )
 
 

@@ -1,0 +1,325 @@
+"""Many runs of a hybrid system at once, in SIMD lanes; nothing is kept but how each ended.
+
+A pool of runs is advanced mode by mode: all that are in one mode take a step together, events are
+located within the steps, and a run that has ended makes room for the next. What is out of the
+ordinary is done by `integrate`, alone, up to the next crossing of the section.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.integrate import (
+    CHATTER_EVENTS,
+    CHATTER_WINDOW,
+    CLOSE,
+    MAX_STEPS,
+    SECTION_TIMEOUT,
+    integrate,
+)
+from flexspine.hybrid.lanes import LaneMode, LaneSystem
+from flexspine.hybrid.outcome import COMPLETED, OutcomeKind
+from flexspine.hybrid.step_events import NOTHING, Flags, Indices, Outlook
+from flexspine.hybrid.system import Arming
+from flexspine.hybrid.trajectory import Arc, HybridState, Trajectory
+
+# Runs in progress at a time: enough that a call from Python costs little a run, few enough that
+# their Taylor series stay in the caches.
+POOL = 4096
+
+# s; a step halved to this because a guard turns in it will not become clear.
+SHORTEST = 1e-6
+
+# A mode waits until it holds this share of the runs in progress, or more than any other.
+WORTHWHILE = 1 / 16
+
+# Rounds between looks at runs that get nowhere.
+CHECK_ROUNDS = 16
+
+NONE = -1
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where k runs start: one mode, states (n, k), held variables (m, k), parameters (p, k)."""
+
+    mode: str
+    states: Array
+    held: Array
+    parameters: Array
+
+    def __len__(self) -> int:
+        return len(self.states.T)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """How k runs ended.
+
+    ``kinds`` (k,) are positions in ``outcomes``; ``crossings`` (k,) of the section; ``time`` (k,)
+    the end and ``section_time`` (k,) the last crossing, in s; ``states`` (n, k) at the end and
+    ``section_states`` (n, k) at the last crossing, or the start if there is none; ``largest``
+    (t, k) of the tracked observables. ``alone`` counts how often a run had to be done by itself.
+    """
+
+    outcomes: tuple[OutcomeKind, ...]
+    kinds: NDArray[np.int8]
+    crossings: NDArray[np.int64]
+    time: Array
+    states: Array
+    section_time: Array
+    section_states: Array
+    largest: Array
+    alone: int
+
+
+def run_many(lanes: LaneSystem, starts: Starts, crossings: int, *, pool: int = POOL) -> Ends:
+    """Run all until the section was crossed ``crossings`` times, or they end otherwise."""
+    return _Pool(lanes, starts, crossings, min(pool, len(starts))).run()
+
+
+class _Pool:
+    """The runs in progress, one column each, and the results so far."""
+
+    def __init__(self, lanes: LaneSystem, starts: Starts, wanted: int, size: int) -> None:
+        system = lanes.system
+        self.lanes, self.system, self.starts, self.wanted = lanes, system, starts, wanted
+        self.names = {name: number for number, name in enumerate(system.modes)}
+        n, m, p = len(system.states), len(system.held), len(system.parameters)
+        self.n_held, total = m, len(starts)
+        # In progress. Numbers are the held variables and then the parameters.
+        self.states, self.numbers = np.zeros((n, size)), np.zeros((m + p, size))
+        self.coefficients: dict[str, Array] = {}
+        self.mode, self.run_of = np.full(size, NONE), np.zeros(size, dtype=int)
+        self.time, self.since, self.longest = (np.zeros(size) for _ in range(3))
+        self.crowded, self.round_of = (np.zeros(size, dtype=int) for _ in range(2))
+        self.event_time = np.zeros(size)
+        self.soon = np.zeros(size, dtype=bool)  # an event is to be expected in the next step
+        self.requires = [(system.places[s], v) for s, v in system.section.requires.items()]
+        self.resets = [(system.places[s], v) for s, v in system.section.resets.items()]
+        # Results.
+        self.started, self.round, self.alone = 0, 0, 0
+        self.outcomes = [COMPLETED]
+        self.kinds = np.full(total, NONE, dtype=np.int8)
+        self.crossings = np.zeros(total, dtype=np.int64)
+        self.end_time, self.section_time = np.zeros(total), np.zeros(total)
+        self.end_states, self.section_states = starts.states.copy(), starts.states.copy()
+        self.largest = np.zeros((len(system.tracked), total))
+
+    def run(self) -> Ends:
+        while True:
+            if self.started < len(self.starts):
+                self._fill(np.flatnonzero(self.mode == NONE))
+            counts = np.bincount(self.mode[self.mode != NONE], minlength=len(self.names))
+            if not counts.any():
+                break
+            enough = min(counts.max(), WORTHWHILE * counts.sum())
+            for name, number in self.names.items():
+                if counts[number] >= enough:
+                    self._advance(self.lanes.mode(name), np.flatnonzero(self.mode == number))
+            self.round += 1
+            if self.round % CHECK_ROUNDS == 0:
+                self._look_after()
+        return Ends(
+            tuple(self.outcomes),
+            self.kinds,
+            self.crossings,
+            self.end_time,
+            self.end_states,
+            self.section_time,
+            self.section_states,
+            self.largest,
+            self.alone,
+        )
+
+    def _fill(self, free: Indices) -> None:
+        """Start runs in free slots."""
+        starts = self.starts
+        runs = np.arange(self.started, min(self.started + len(free), len(starts)))
+        if not len(runs):
+            return
+        self.started += len(runs)
+        slots = free[: len(runs)]
+        self.states[:, slots] = starts.states[:, runs]
+        self.numbers[: self.n_held, slots] = starts.held[:, runs]
+        self.numbers[self.n_held :, slots] = starts.parameters[:, runs]
+        self.run_of[slots], self.mode[slots] = runs, self.names[starts.mode]
+        for kept in (self.time, self.since, self.crowded, self.event_time, self.soon):
+            kept[slots] = 0
+        self.longest[slots], self.round_of[slots] = np.inf, self.round
+        for name, coefficients in self.coefficients.items():
+            mode = self.lanes.mode(name)
+            coefficients[slots] = mode.coefficients(starts.parameters.take(runs, axis=1))
+        self._alone(slots[self._close_to_guards(slots)])
+
+    def _close_to_guards(self, slots: Indices) -> Flags:
+        """Where a start is so close to a guard that what is due there has to be looked at."""
+        mode = self.lanes.mode(self.starts.mode)
+        numbers = self.numbers[: mode.code.n_inputs].take(slots, axis=1)
+        values = mode.code.kernel(self.states.take(slots, axis=1), pars=numbers)
+        close = np.zeros(len(slots), dtype=bool)
+        for jump in mode.code.jumps:
+            if jump.acts:
+                value = values[jump.value]
+                by_level = jump.guard.arming is Arming.LEVEL
+                close |= ~(value > CLOSE) & (by_level | ~(value < -CLOSE))
+        return close
+
+    def _coefficients(self, mode: LaneMode) -> Array:
+        """The coefficients of a mode's flow for every slot, made when first needed."""
+        if mode.name not in self.coefficients:
+            self.coefficients[mode.name] = mode.coefficients(self.numbers[self.n_held :])
+        return self.coefficients[mode.name]
+
+    def _advance(self, mode: LaneMode, slots: Indices) -> None:
+        """Let the runs in some slots, all in one mode, take a step up to their next event."""
+        soon = self.soon[slots]
+        first, others = _padded(slots[soon], mode), _padded(slots[~soon], mode)
+        lanes, kept = np.concatenate([first, others]), len(first)
+        states, numbers = self.states.take(lanes, axis=1), self.numbers.take(lanes, axis=1)
+        folded, longest = self._coefficients(mode).take(lanes, axis=0), self.longest[lanes]
+        end, lived, series = mode.flow(states, numbers, folded, longest, kept)
+        found = mode.events.screen(states, end, lived, numbers)
+        doubtful, happens = found.doubt != 0, (found.guard != NOTHING) | (found.top != 0)
+        self.soon[lanes], self.longest[lanes] = found.soon != 0, np.inf
+        # Lanes that only fill up repeat another one, whose slot is written twice with the same.
+        plain = np.flatnonzero(~(happens | doubtful))
+        self.states[:, lanes[plain]] = end.take(plain, axis=1)
+        self.time[lanes[plain]] += lived[plain]
+
+        doubted = np.flatnonzero(doubtful)
+        self.longest[lanes[doubted]] = lived[doubted] / 2
+        odd = [lanes[doubted[lived[doubted] < 2 * SHORTEST]]]
+        known, unforeseen = np.arange(kept), kept + np.flatnonzero(happens[kept:])
+        for few in (known, _padded(unforeseen, mode)):
+            if not len(few):
+                continue
+            given, guard, whole = numbers.take(few, axis=1), found.guard[few], lived[few]
+            if few is not known:
+                begin, coefficients = states.take(few, axis=1), folded.take(few, axis=0)
+                _, _, series = mode.flow(begin, given, coefficients, whole, len(few))
+            series[-2] = np.where(guard == NOTHING, whole, found.share[few] * whole)
+            series[-1] = guard
+            seen = mode.events.look(series, given)
+            looked = happens[few] & ~doubtful[few]
+            odd.append(lanes[few[looked & (seen.odd != 0)]])
+            clear = np.flatnonzero(looked & (seen.odd == 0))
+            self._land(mode, lanes[few[clear]], guard[clear], seen.take(clear))
+        self._alone(np.unique(np.concatenate(odd)))
+
+    def _land(self, mode: LaneMode, slots: Indices, guard: Array, seen: Outlook) -> None:
+        """Let runs arrive where an event or the largest value of something was in their step."""
+        self.states[:, slots] = seen.states
+        self.numbers[: self.n_held, slots] = seen.held
+        self.time[slots] += seen.time
+        self._raise(mode, slots, seen.largest)
+        fired = guard != NOTHING
+        self.soon[slots[fired]] = False
+        self._happen(mode, slots[fired], guard[fired])
+
+    def _raise(self, mode: LaneMode, slots: Indices, tops: Array) -> None:
+        """Keep the largest values so far."""
+        runs = self.run_of[slots]
+        for row, which in enumerate(mode.events.tracked):
+            best = self.largest[which]
+            best[runs] = np.maximum(best[runs], tops[row])
+
+    def _happen(self, mode: LaneMode, slots: Indices, guards: Array) -> None:
+        """Note what the events of a step lead to."""
+        late = self.time[slots] - self.since[slots] > SECTION_TIMEOUT
+        self._miss(slots[late])
+        slots, guards = slots[~late], guards[~late]
+        quick = self.time[slots] - self.event_time[slots] < CHATTER_WINDOW
+        self.crowded[slots] = np.where(quick, self.crowded[slots] + 1, 0)
+        self.event_time[slots] = self.time[slots]
+        for row, jump in enumerate(mode.code.jumps):
+            here = slots[guards == row]
+            if not len(here):
+                continue
+            self.mode[here] = self.names[jump.target]
+            if jump.guard.name in self.system.section.guards:
+                self._cross(here)
+            if jump.guard.ends is not None:
+                self._end(here, jump.guard.ends)
+
+    def _cross(self, slots: Indices) -> None:
+        """Count a crossing of the section."""
+        for place, value in self.resets:
+            self.numbers[place, slots] = value
+        runs = self.run_of[slots]
+        self.crossings[runs] += 1
+        self.section_time[runs] = self.since[slots] = self.time[slots]
+        self.section_states[:, runs] = self.states[:, slots]
+        self.round_of[slots] = self.round
+        self._end(slots[self.crossings[runs] == self.wanted], COMPLETED)
+
+    def _end(self, slots: Indices, outcome: OutcomeKind) -> None:
+        """Note how runs ended, and free their slots."""
+        if outcome not in self.outcomes:
+            self.outcomes.append(outcome)
+        runs = self.run_of[slots]
+        self.kinds[runs] = self.outcomes.index(outcome)
+        self.end_time[runs] = self.time[slots]
+        self.end_states[:, runs] = self.states[:, slots]
+        self.mode[slots] = NONE
+
+    def _look_after(self) -> None:
+        """End what stays away from the section, and look closer where events or steps crowd."""
+        running = self.mode != NONE
+        late = running & (self.time - self.since > SECTION_TIMEOUT)
+        self._miss(np.flatnonzero(late))
+        crowded = (self.crowded >= CHATTER_EVENTS) | (self.round - self.round_of > MAX_STEPS)
+        self._alone(np.flatnonzero(running & ~late & crowded))
+
+    def _miss(self, slots: Indices) -> None:
+        """End runs that have not come back to the section in time."""
+        self.time[slots] = self.since[slots] + SECTION_TIMEOUT
+        self._end(slots, self.system.section.missed)
+
+    def _alone(self, slots: Indices) -> None:
+        """Do by itself, up to the next crossing, what is out of the ordinary."""
+        names = list(self.names)
+        for slot in slots.tolist():
+            self.alone += 1
+            bound = BoundSystem(self.lanes.compiled, self.numbers[self.n_held :, slot].copy())
+            start = HybridState(
+                float(self.time[slot]),
+                names[self.mode[slot]],
+                self.states[:, slot].copy(),
+                self.numbers[: self.n_held, slot].copy(),
+            )
+            left = SECTION_TIMEOUT - (start.time - float(self.since[slot]))
+            done = integrate(bound, start, crossings=1, section_timeout=left, record=True)
+            one = np.array([slot])
+            for arc in done.arcs:
+                mode = self.lanes.mode(arc.mode)
+                self._raise(mode, one, _largest(mode, done, arc))
+            self.time[slot], self.states[:, slot] = done.end.time, done.end.states
+            self.numbers[: self.n_held, slot] = done.end.held
+            self.mode[slot], self.longest[slot] = self.names[done.end.mode], np.inf
+            self.soon[slot], self.crowded[slot] = False, 0
+            if done.outcome.completed:
+                self._cross(one)
+            else:
+                self._end(one, done.outcome.kind)
+
+
+def _padded(lanes: Indices, mode: LaneMode) -> Indices:
+    """Lanes, the last one repeated until they fill the mode's integrators."""
+    return np.concatenate([lanes, np.repeat(lanes[-1:], -len(lanes) % mode.width)])
+
+
+def _largest(mode: LaneMode, done: Trajectory, arc: Arc) -> Array:
+    """The largest tracked values in a recorded arc, shape (tracked, 1)."""
+    numbers = np.concatenate([arc.held, done.bound.parameters])
+    count, n, order = arc.series.shape
+    series = np.empty((n * order + 2, count))
+    series[:-2] = arc.series.reshape(count, -1).T
+    series[-2], series[-1] = np.diff(arc.times), NOTHING
+    seen = mode.events.look(series, np.repeat(numbers[:, None], count, axis=1))
+    largest: Array = seen.largest.max(axis=1, keepdims=True)
+    return largest

@@ -1,0 +1,144 @@
+"""Machine code for many runs at once: each mode's flow in SIMD lanes, without events.
+
+Event detection inside an integrator has to stop lanes one by one. Here a lane takes a full step
+of its own length, keeps the step's Taylor series, and events are looked for afterwards, for
+hundreds of lanes in one call.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from flexspine.hybrid.cache import mend_cache
+from flexspine.hybrid.compile import Array, CompiledSystem
+from flexspine.hybrid.lowering import Lowering
+from flexspine.hybrid.step_events import StepEvents
+
+# Bytes; the Taylor coefficients of all terms of all lanes of an integrator stay in fast memory.
+COEFFICIENTS = 160_000
+
+# SIMD registers side by side: so many that a call from Python costs little a lane.
+REGISTERS = (2, 12)
+
+
+# s; where a field is so simple that its own steps have no end, guards turn in them unseen.
+LONGEST = 0.02
+
+
+class LaneMode:
+    """The code of one mode for many runs, ``width`` of them in one integrator.
+
+    Arrays have one column a run.
+    """
+
+    def __init__(self, compiled: CompiledSystem, name: str) -> None:
+        system = compiled.system
+        self.name, self.code = name, compiled.mode(name)
+        mode = self.code.mode
+        states = [hy.expression(f"s{i}") for i in range(len(system.states))]
+        held = {s: hy.par[i] for i, s in enumerate(system.held)}
+        known = {**dict(zip(system.states, states, strict=True)), **held}
+        lower = Lowering(known, system.parameters, mode.definitions, len(held))
+        field = [(v, lower(mode.field[s])) for s, v in zip(system.states, states, strict=True)]
+        self.width = _width(self.code.integrator)
+        self._integrator = hy.taylor_adaptive_batch(
+            field, np.zeros((len(states), self.width)), tol=compiled.tolerance
+        )
+        self._coefficients = compiled.coefficients(lower.coefficients)
+        # Code that needs few numbers may not reach as far as all held variables.
+        count = len(self._integrator.pars)
+        self.n_held, self.n_coefficients = min(len(held), count), max(count - len(held), 0)
+        self._limited = False
+        self.events = StepEvents(compiled, self.code, self._integrator.order)
+
+    def coefficients(self, parameters: Array) -> Array:
+        """The folded numbers of the flow for parameters of shape (p, k), shape (k, numbers)."""
+        count = parameters.shape[1]
+        # Whole registers only: what is left over would be computed by other instructions.
+        filled = np.arange(count + -count % self.width).clip(max=count - 1)
+        result: Array = self._coefficients(parameters.take(filled, axis=1))
+        return result[: self.n_coefficients, :count].T.copy()
+
+    def flow(
+        self, states: Array, held: Array, folded: Array, longest: Array, kept: int = 0
+    ) -> tuple[Array, Array, Array]:
+        """Take one step of every lane; their number has to be a multiple of ``width``.
+
+        ``held`` (m, k) or more rows, ``folded`` from `coefficients`; ``longest`` (k,) bounds the
+        steps, in s, as LONGEST does. Returns states (n, k), lengths (k,) in s and the Taylor
+        series of the first ``kept`` lanes, shape (n (order + 1) + 2, kept), of which the last two
+        rows are free.
+        """
+        integrator, width = self._integrator, self.width
+        state, pars, length = integrator.state, integrator.pars, integrator.last_h
+        taylor = integrator.tc.reshape(-1, width)
+        blocks, numbers = _blocks(states, width), self._numbers(held, folded)
+        lengths, series = np.empty((len(blocks), width)), np.empty((len(taylor) + 2, kept))
+        bounds = np.minimum(longest, LONGEST).reshape(-1, width)
+        bounded = np.full(len(blocks), True) if self._limited else (bounds < LONGEST).any(axis=1)
+        limits = bounds.tolist() if bounded.any() else []
+        steps = zip(blocks, numbers, bounded.tolist(), strict=True)
+        for i, (here, given, limit) in enumerate(steps):
+            state[:] = here
+            pars[:] = given
+            keep = i * width < kept
+            if limit:
+                integrator.step(limits[i], write_tc=keep)
+            else:
+                integrator.step(write_tc=keep)
+            here[:] = state
+            lengths[i] = length
+            if keep:
+                series[:-2, i * width : (i + 1) * width] = taylor
+        # Flows are autonomous, and a time that is not finite would stick.
+        integrator.set_time(0.0)
+        if not self._limited and not (lengths <= LONGEST).all():
+            self._limited = True
+            return self.flow(states, held, folded, longest, kept)
+        return blocks.transpose(1, 0, 2).reshape(states.shape), lengths.reshape(-1), series
+
+    def _numbers(self, held: Array, folded: Array) -> Array:
+        """What the integrator's parameters are, block by block: held variables, coefficients."""
+        n, width = self.n_held, self.width
+        numbers = np.empty((len(folded) // width, n + folded.shape[1], width))
+        numbers[:, :n] = held[:n].reshape(n, -1, width).transpose(1, 0, 2)
+        numbers[:, n:] = folded.reshape(len(numbers), width, -1).transpose(0, 2, 1)
+        return numbers
+
+
+def _width(integrator: Any) -> int:
+    """How many lanes suit a field: the fewer, the longer it is."""
+    register = hy.recommended_simd_size()
+    lane = 8 * (integrator.order + 1) * len(integrator.decomposition)
+    return int(register * np.clip(COEFFICIENTS // (lane * register), *REGISTERS))
+
+
+def _blocks(columns: Array, width: int) -> Array:
+    """Columns in blocks, shape (blocks, rows, width)."""
+    rows, _ = columns.shape
+    return columns.reshape(rows, -1, width).transpose(1, 0, 2).copy()
+
+
+class LaneSystem:
+    """The lane code of a compiled system, mode by mode on demand."""
+
+    def __init__(self, compiled: CompiledSystem) -> None:
+        self.compiled, self.system = compiled, compiled.system
+        self._modes: dict[str, LaneMode] = {}
+
+    def mode(self, name: str) -> LaneMode:
+        """Return the named mode, compiled."""
+        if name not in self._modes:
+            self._modes[name] = LaneMode(self.compiled, name)
+            mend_cache()
+        return self._modes[name]
+
+
+@lru_cache(maxsize=64)
+def compile_lanes(compiled: CompiledSystem) -> LaneSystem:
+    """Return the lane code of a system, the same object for the same argument."""
+    return LaneSystem(compiled)
