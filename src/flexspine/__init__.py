@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flexspine.gaits.stability import Stability, floquet_multipliers
     from flexspine.gaits.switching import switch_branch
     from flexspine.models.dataset import to_dataset
+    from flexspine.models.many import Ensemble, simulate_many
     from flexspine.models.model import Model
     from flexspine.models.presets import load_model, preset_names
     from flexspine.models.simulation import Run, simulate
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Branch": "gaits.continuation",
+    "Ensemble": "models.many",
     "FlexspineError": "errors",
     "Gait": "gaits.gait",
     "InputError": "errors",
@@ -49,6 +51,7 @@ _HOMES = {
     "preset_names": "models.presets",
     "save_gait": "gaits.files",
     "simulate": "models.simulation",
+    "simulate_many": "models.many",
     "stride_map": "gaits.return_map",
     "strip": "report.animation",
     "summarize": "gaits.measures",
@@ -59,6 +62,7 @@ _HOMES = {
 
 __all__ = [
     "Branch",
+    "Ensemble",
     "FlexspineError",
     "Gait",
     "InputError",
@@ -80,6 +84,7 @@ __all__ = [
     "preset_names",
     "save_gait",
     "simulate",
+    "simulate_many",
     "stride_map",
     "strip",
     "summarize",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf, pi
 from typing import Any
@@ -73,6 +73,10 @@ class Model:
         for name in ("apex", "touchdown"):
             plain = {key: float(value) for key, value in getattr(self, name).items()}
             object.__setattr__(self, name, plain)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What goes to another process: the fields, not what was made of them."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def with_values(
         self,
