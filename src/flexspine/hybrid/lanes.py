@@ -16,7 +16,7 @@ import numpy as np
 from flexspine.hybrid.cache import mend_cache
 from flexspine.hybrid.compile import Array, CompiledSystem
 from flexspine.hybrid.lowering import Lowering
-from flexspine.hybrid.step_events import Flags, StepEvents
+from flexspine.hybrid.step_events import StepEvents
 
 # Bytes; the Taylor coefficients of all terms of all lanes of an integrator stay in fast memory.
 COEFFICIENTS = 160_000
@@ -79,7 +79,7 @@ class LaneMode:
         blocks, numbers = _blocks(states, width), self._numbers(held, folded)
         lengths, series = np.empty((len(blocks), width)), np.empty((len(taylor) + 2, kept))
         bounds = np.minimum(longest, LONGEST).reshape(-1, width)
-        bounded: Flags = (bounds < LONGEST).any(axis=1) | self._limited
+        bounded = np.logical_or((bounds < LONGEST).any(axis=1), self._limited)
         limits = bounds.tolist() if bounded.any() else []
         steps = zip(blocks, numbers, bounded.tolist(), strict=True)
         for i, (here, given, limit) in enumerate(steps):

@@ -23,6 +23,7 @@ from flexspine.gaits.problem import Problem
 from flexspine.gaits.stability import Stability, floquet_multipliers
 from flexspine.models.model import Model
 from flexspine.models.presets import load_model
+from flexspine.studies.following import STEP, LostGaitError, carried
 
 RIGID, LOCKED, FLEXIBLE = "published rigid", "locked spine", "flexible"
 PRESETS = {
@@ -31,16 +32,10 @@ PRESETS = {
     FLEXIBLE: "kamimura2015-flexible",
 }
 
-# Natural units along a branch; fine enough for figures.
-STEP = 0.1
-
 # Natural units; a gait of a stiff spine that bends more than this is none of a locked one.
 ALMOST_STRAIGHT = 0.05
 
 STIFF_POINTS = 60
-
-# Relative; the presets' gaits are known to this and better.
-SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -203,20 +198,14 @@ def _start(body: str, setting: Setting) -> Gait:
         ("height", setting.height, setting.height),
         ("mean_speed", *setting.speeds),
     ):
-        here = gait.quantities[over]
-        value = min(max(here, low), high)
-        if abs(here - value) <= SAME * value:
-            continue
-        bounds = (min(here, value), max(here, value))
-        found = trace_branch(gait, over, bounds=bounds, longest_step=STEP)
-        points = found.at(value)
-        if not points:
+        value = min(max(gait.quantities[over], low), high)
+        try:
+            gait = carried(gait, over, value)
+        except LostGaitError as lost:
             raise ParameterError(
-                f"{body}: no gait of the published family at {over} = {value:g} "
-                f"({'; '.join(found.ends)})",
-                f"give a value nearer to {here:g}",
-            )
-        gait = points[0].gait
+                f"{body}: no gait of the published family at {over} = {value:g} ({lost})",
+                f"give a value nearer to {gait.quantities[over]:g}",
+            ) from None
     return gait
 
 

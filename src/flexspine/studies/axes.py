@@ -1,0 +1,146 @@
+"""Axes of a sweep: what varies, and where a grid or a sample puts its points."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexspine.errors import InputError, ParameterError
+from flexspine.hybrid.compile import Array
+from flexspine.models.model import Model
+from flexspine.models.simulation import check_count
+from flexspine.parameters import is_number
+
+GRID, RANDOM, SOBOL = "grid", "random", "sobol"
+METHODS = (GRID, RANDOM, SOBOL)
+
+# Binary digits of a Sobol sequence: 4 thousand million points.
+SOBOL_BITS = 32
+
+FORMS = (
+    "write a list of values, {low = ..., high = ...}, {around = SHARE} or {within = AMOUNT}, "
+    "and steps = COUNT for a grid"
+)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What varies, and over which values: listed, or a range with ``steps`` points on a grid.
+
+    A range is from ``low`` to ``high``, or about a model's own value: ``around`` it by a share, or
+    ``within`` an amount (SI, radians).
+    """
+
+    name: str
+    values: tuple[float, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    around: float | None = None
+    within: float | None = None
+    steps: int | None = None
+
+    @classmethod
+    def read(cls, name: str, content: Any) -> Axis:
+        """Make an axis of what a file says of it. Raises `InputError`."""
+        if isinstance(content, (list, tuple)):
+            if not content or not all(map(is_number, content)):
+                raise InputError(f"axis '{name}' is not a list of numbers", FORMS)
+            return cls(name, tuple(map(float, content)))
+        keys = set(content) if isinstance(content, Mapping) else set()
+        if keys - {"steps"} not in ({"low", "high"}, {"around"}, {"within"}):
+            raise InputError(f"axis '{name}' is not understood", FORMS)
+        bounds = {key: content[key] for key in keys - {"steps"}}
+        for key, value in bounds.items():
+            if not (is_number(value) and np.isfinite(value)):
+                raise InputError(f"axis '{name}': {key} = {value!r} is no number", FORMS)
+        steps = content.get("steps")
+        if steps is not None:
+            steps = check_count(f"axis '{name}': steps", steps)
+        numbers: dict[str, Any] = {key: float(value) for key, value in bounds.items()}
+        axis = cls(name, steps=steps, **numbers)
+        low, high = axis.range(1.0)
+        if not low <= high:
+            raise InputError(f"axis '{name}' goes from {low:g} down to {high:g}", "swap them")
+        return axis
+
+    def record(self) -> Any:
+        """What a file would say of it."""
+        if self.values:
+            return list(self.values)
+        names = ("low", "high", "around", "within", "steps")
+        return {n: getattr(self, n) for n in names if getattr(self, n) is not None}
+
+    def range(self, own: float) -> tuple[float, float]:
+        """Lowest and highest value for a model whose own is ``own``."""
+        if self.values:
+            return min(self.values), max(self.values)
+        if self.low is not None and self.high is not None:
+            return self.low, self.high
+        room = self.within if self.around is None else self.around * abs(own)
+        assert room is not None
+        return own - room, own + room
+
+    def grid(self, own: float) -> Array:
+        """Its values on a grid."""
+        if self.values:
+            return np.array(self.values)
+        assert self.steps is not None
+        low, high = self.range(own)
+        return np.linspace(low, high, self.steps)
+
+    def sample(self, own: float, share: Array) -> Array:
+        """Its values at shares from 0 to 1 of it."""
+        if self.values:
+            places = np.minimum((share * len(self.values)).astype(int), len(self.values) - 1)
+            chosen: Array = np.array(self.values)[places]
+            return chosen
+        low, high = self.range(own)
+        return low + (high - low) * share
+
+
+def own_value(model: Model, name: str) -> float:
+    """A model's own value of what an axis varies; NaN if it has no such thing."""
+    return {**model.numbers}.get(name, float("nan"))
+
+
+def grid_points(model: Model, axes: tuple[Axis, ...], first: int, count: int) -> dict[str, Array]:
+    """Points of a grid by number; the last axis changes fastest."""
+    lines = [axis.grid(own_value(model, axis.name)) for axis in axes]
+    places = np.unravel_index(np.arange(first, first + count), [len(line) for line in lines])
+    return {axis.name: line[place] for axis, line, place in zip(axes, lines, places, strict=True)}
+
+
+def sampled_points(
+    model: Model, axes: tuple[Axis, ...], method: str, seed: tuple[int, ...], first: int, count: int
+) -> dict[str, Array]:
+    """Points of a sample by number; they do not depend on which others are asked for."""
+    sequence = np.random.SeedSequence(seed)
+    if method == SOBOL:
+        from scipy.stats import qmc
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of lengths that are no powers of two
+            engine = qmc.Sobol(len(axes), bits=SOBOL_BITS, rng=np.random.default_rng(sequence))
+            shares = engine.fast_forward(first).random(count)
+    else:
+        bits = np.random.PCG64(sequence)
+        bits.advance(first * len(axes))
+        shares = np.random.Generator(bits).random((count, len(axes)))
+    return {
+        axis.name: axis.sample(own_value(model, axis.name), shares[:, i])
+        for i, axis in enumerate(axes)
+    }
+
+
+def grid_size(axes: tuple[Axis, ...]) -> int:
+    """How many points a grid has. Raises `ParameterError` for an axis without steps."""
+    size = 1
+    for axis in axes:
+        if not axis.values and axis.steps is None:
+            raise ParameterError(f"axis '{axis.name}' has no steps", "give steps = COUNT")
+        size *= len(axis.values) or axis.steps or 1
+    return size

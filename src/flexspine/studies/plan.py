@@ -1,0 +1,301 @@
+"""What a sweep does: read from a TOML file, written down so that it can be repeated."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexspine.errors import InputError, ParameterError, PresetError, UnknownNameError
+from flexspine.gaits.files import load_gait
+from flexspine.hybrid.compile import Array
+from flexspine.models.many import make_cases
+from flexspine.models.model import TOLERANCES, Model, Source, check_between
+from flexspine.models.presets import load_model
+from flexspine.models.registry import find_kind
+from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
+from flexspine.parameters import build, flattened, is_number, values
+from flexspine.studies.axes import GRID, METHODS, Axis, grid_points, grid_size, sampled_points
+
+RUNS, SEARCHES, GAITS = "runs", "searches", "gaits"
+TASKS = (RUNS, SEARCHES, GAITS)
+
+# Points in one piece of work, and in one file.
+CHUNKS = {RUNS: 16384, SEARCHES: 16}
+
+# What each task can be told, besides the tolerance.
+OPTIONS: dict[str, dict[str, type]] = {
+    RUNS: {"strides": int},
+    SEARCHES: {"starts": int, "symmetric": bool, "fixed": dict},
+    GAITS: {"over": str, "symmetric": bool},
+}
+
+ENTRIES = {"model", "task", "method", "samples", "seed", "chunk", "options", "axes", "set"}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep: a ``task`` at points of ``axes``, for each of ``models``.
+
+    ``method`` is ``grid``, ``random`` or ``sobol``; the latter two draw ``samples`` points a model
+    from ``seed``. ``chunk`` points make a piece of work and a file. ``options`` are the task's:
+    ``strides`` of runs; ``starts``, ``symmetric`` and ``fixed`` of searches; the axis ``over``
+    which gaits are followed, and ``symmetric``; ``tolerance`` of all.
+    """
+
+    models: tuple[Model, ...]
+    axes: tuple[Axis, ...]
+    task: str = RUNS
+    method: str = GRID
+    samples: int | None = None
+    seed: int = 0
+    chunk: int | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def points(self) -> int:
+        """How many points each model has."""
+        return grid_size(self.axes) if self.method == GRID else self.samples or 0
+
+    @property
+    def chunk_points(self) -> int:
+        """How many points a chunk has; following gaits, those on one line over its axis."""
+        if self.task == GAITS:
+            axis = self.axes[-1]
+            return len(axis.values) or axis.steps or 1
+        return self.chunk or CHUNKS[self.task]
+
+    @property
+    def chunks_each(self) -> int:
+        """How many chunks each model has."""
+        return ceil(self.points / self.chunk_points)
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks there are."""
+        return self.chunks_each * len(self.models)
+
+    @property
+    def tolerance(self) -> float:
+        """The integrator's."""
+        return float(self.options.get("tolerance", DEFAULT_TOLERANCE))
+
+    def of_chunk(self, chunk: int) -> tuple[Model, int, int]:
+        """A chunk's model, its first point among that model's and how many points it has."""
+        number, part = divmod(chunk, self.chunks_each)
+        first = part * self.chunk_points
+        return self.models[number], first, min(self.chunk_points, self.points - first)
+
+    def at(self, chunk: int) -> dict[str, Array]:
+        """The points of a chunk: values of every axis by name."""
+        model, first, count = self.of_chunk(chunk)
+        if self.method == GRID:
+            return grid_points(model, self.axes, first, count)
+        seed = (self.seed, chunk // self.chunks_each)
+        return sampled_points(model, self.axes, self.method, seed, first, count)
+
+    def record(self) -> dict[str, Any]:
+        """All that decides the rows, as JSON holds it."""
+        record = {
+            "task": self.task,
+            "method": self.method,
+            "samples": self.samples,
+            "seed": self.seed,
+            "chunk": self.chunk_points,
+            "options": {**self.options, "tolerance": self.tolerance},
+            "axes": {axis.name: axis.record() for axis in self.axes},
+            "models": [model_record(model) for model in self.models],
+        }
+        return dict(json.loads(json.dumps(record)))
+
+    @classmethod
+    def revive(cls, record: Mapping[str, Any]) -> Plan:
+        """Make the plan of a record. Raises `InputError` if it is none."""
+        try:
+            return cls(
+                models=tuple(_revived(model) for model in record["models"]),
+                axes=tuple(Axis.read(n, content) for n, content in record["axes"].items()),
+                task=record["task"],
+                method=record["method"],
+                samples=record["samples"],
+                seed=record["seed"],
+                chunk=record["chunk"],
+                options=record["options"],
+            )
+        except (KeyError, TypeError, AttributeError):
+            raise InputError("the record of a sweep is damaged", "begin it anew") from None
+
+    @property
+    def key(self) -> str:
+        """A short name of all that decides the rows."""
+        text = json.dumps(self.record(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read a plan from a TOML file. Raises `InputError`."""
+    try:
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except OSError as failure:
+        raise InputError(f"cannot read '{path}' ({failure.strerror})", "give a TOML file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as failure:
+        raise InputError(f"'{path}' is not valid TOML: {failure}", "mend that line") from None
+    try:
+        return _plan(content, Path(path).parent)
+    except InputError as failure:
+        raise InputError(f"'{path}': {failure.message}", failure.remedy) from None
+
+
+def load_start(name: str, place: Path | None = None) -> Model:
+    """Load a preset, a TOML file, or the model of a gait file (JSON); paths are from ``place``."""
+    path = Path(name) if place is None else place / name
+    if Path(name).suffix == ".json":
+        gait = load_gait(path)
+        return gait.model.renamed(path.stem, gait.model.source)
+    if Path(name).suffix == ".toml":
+        return load_model(path)
+    return load_model(name)
+
+
+def _plan(content: Mapping[str, Any], place: Path) -> Plan:
+    for entry in content:
+        if entry not in ENTRIES:
+            raise UnknownNameError("entry", entry, ENTRIES)
+    for entry in ("model", "axes"):
+        if entry not in content:
+            raise InputError(f"there is no '{entry}'", f"add {entry}")
+    names = content["model"]
+    names = [names] if isinstance(names, str) else names
+    if not (isinstance(names, list) and names and all(isinstance(n, str) for n in names)):
+        raise InputError("'model' names no model", 'write model = "PRESET" or a list of them')
+    for entry in ("axes", "options", "set"):
+        if not isinstance(content.get(entry, {}), Mapping):
+            raise InputError(f"'{entry}' is not a table", f"write [{entry}]")
+    models = [_changed(load_start(n, place), content.get("set", {})) for n in names]
+    axes = [Axis.read(n, what) for n, what in _axes(content["axes"]).items()]
+    plain = {k: content[k] for k in ("task", "method", "samples", "seed", "chunk") if k in content}
+    return Plan(tuple(models), tuple(axes), options=content.get("options", {}), **plain)
+
+
+def _axes(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Axes by dotted name, whether it was quoted or written as nested tables."""
+    forms = {"low", "high", "around", "within", "steps"}
+    flat: dict[str, Any] = {}
+    for name, content in table.items():
+        if isinstance(content, Mapping) and not content.keys() <= forms:
+            flat |= _axes(content, f"{prefix}{name}.")
+        else:
+            flat[f"{prefix}{name}"] = content
+    return flat
+
+
+def _changed(model: Model, table: Mapping[str, Any]) -> Model:
+    """A model with some values set."""
+    given = flattened(table)
+    for name, value in given.items():
+        if not is_number(value):
+            raise ParameterError(f"'{name}' = {value!r} is no number", "give a number")
+    apex = {name: float(given.pop(name)) for name in list(given) if name in model.apex}
+    angles = {
+        name.partition(".")[2]: float(given.pop(name))
+        for name in list(given)
+        if name.startswith("touchdown.")
+    }
+    return model.with_values(
+        {name: float(value) for name, value in given.items()}, apex=apex, touchdown=angles
+    )
+
+
+def _check(plan: Plan) -> None:
+    """Refuse a plan that cannot be done, before anything is."""
+    for what, given, known in (
+        ("task", plan.task, TASKS),
+        ("method", plan.method, METHODS),
+    ):
+        if given not in known:
+            raise UnknownNameError(what, str(given), known)
+    names = [model.name for model in plan.models]
+    if len(set(names)) < len(names):
+        raise InputError("two models have one name", "give each model once")
+    if not (isinstance(plan.seed, int) and not isinstance(plan.seed, bool) and plan.seed >= 0):
+        raise ParameterError(f"seed = {plan.seed!r} is not usable", "give a whole number from 0 on")
+    if plan.chunk is not None:
+        check_count("chunk", plan.chunk)
+    if plan.method == GRID:
+        grid_size(plan.axes)
+        if plan.samples is not None:
+            raise InputError("a grid has no samples", "leave 'samples' out, or sample at random")
+    elif plan.samples is None:
+        raise InputError(f"method '{plan.method}' needs samples", "give samples = COUNT")
+    else:
+        check_count("samples", plan.samples)
+    if not plan.axes:
+        raise InputError("no axis varies", "add one under [axes]")
+    _check_options(plan)
+    for model in plan.models:
+        _check_axes(plan, model)
+
+
+def _check_options(plan: Plan) -> None:
+    known = {**OPTIONS[plan.task], "tolerance": float}
+    for name, value in plan.options.items():
+        if name not in known:
+            raise UnknownNameError(f"option of {plan.task}", name, known)
+        if known[name] is not float and not isinstance(value, known[name]):
+            raise ParameterError(f"{name} = {value!r} is not usable", f"see the task '{plan.task}'")
+    check_between("tolerance", plan.tolerance, *TOLERANCES)
+    for name in ("strides", "starts"):
+        if name in plan.options:
+            check_count(name, plan.options[name])
+    if plan.task == GAITS:
+        over = plan.options.get("over", plan.axes[-1].name)
+        if plan.method != GRID or over != plan.axes[-1].name:
+            raise InputError(
+                "gaits are followed over the last axis of a grid",
+                f"put '{over}' last, on a grid",
+            )
+
+
+def _check_axes(plan: Plan, model: Model) -> None:
+    """Try the ends of every axis."""
+    quantities = {"energy", "mean_speed"} if plan.task != RUNS else set()
+    anywhere = {name for each in plan.models for name in each.numbers}
+    for axis in plan.axes:
+        if axis.name in quantities:
+            continue
+        if axis.name not in model.numbers:
+            if axis.name in anywhere:
+                continue
+            raise UnknownNameError("axis", axis.name, anywhere | quantities)
+        make_cases(model, {axis.name: np.array(axis.range(model.numbers[axis.name]))})
+
+
+def model_record(model: Model) -> dict[str, Any]:
+    """A model's numbers, from which it can be made again."""
+    return {
+        "name": model.name,
+        "model": model.kind.name,
+        "parameters": values(model.parameters),
+        "apex": dict(model.apex),
+        "touchdown": dict(model.touchdown),
+    }
+
+
+def _revived(record: Mapping[str, Any]) -> Model:
+    kind = find_kind(record["model"])
+    try:
+        parameters = build(kind.parameters, record["parameters"])
+    except InputError as failure:
+        raise PresetError(failure.message, failure.remedy) from None
+    title = Source(title=str(record["name"]), source="the record of a sweep")
+    return Model(record["name"], kind, parameters, record["apex"], record["touchdown"], title)

@@ -1,0 +1,218 @@
+"""A sweep on disk: a manifest, and one Parquet file a chunk, each written whole or not at all.
+
+``manifest.json`` tells what is done and with what; rows are in ``rows/model=NAME/part-N.parquet``,
+which pandas, polars and duckdb read as one table. A file that is there is finished.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import platform
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.errors import OUT_OF_SPACE, InputError, OutputError
+from flexspine.parameters import shortened
+from flexspine.studies.plan import Plan
+
+MANIFEST, ROWS, LOCK = "manifest.json", "rows", ".lock"
+DIGEST, TALLY = b"flexspine.digest", b"flexspine.tally"
+LIBRARIES = ("heyoka", "numpy", "scipy", "sympy", "pyarrow")
+
+
+class Part(NamedTuple):
+    """A finished chunk: its file, how many rows it has, and a digest of them."""
+
+    content: bytes
+    rows: int
+    digest: str
+
+
+class About(NamedTuple):
+    """What a finished file says of its rows: how many, their digest, outcomes and strides."""
+
+    rows: int
+    digest: str
+    outcomes: Mapping[str, int]
+    strides: int
+
+
+class Store:
+    """The directory of one sweep. Raises `OutputError` and `InputError`."""
+
+    def __init__(self, path: Path, plan: Plan) -> None:
+        self.path, self.plan = path, plan
+        self.finished: set[int] = set()
+
+    @contextmanager
+    def opened(self) -> Iterator[Store]:
+        """Make or go on with the directory, keeping others out of it meanwhile."""
+        new = [p for p in (self.path, *self.path.parents) if not p.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            lock = (self.path / LOCK).open("w")
+        except OSError as failure:
+            if failure.errno in OUT_OF_SPACE:
+                raise
+            raise OutputError(
+                f"cannot write to '{self.path}' ({failure.strerror})", "give another directory"
+            ) from None
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise OutputError(
+                    f"another process is at work in '{self.path}'",
+                    "wait for it, or give another directory",
+                ) from None
+            try:
+                self._begin()
+                yield self
+            finally:
+                (self.path / LOCK).unlink(missing_ok=True)
+                if not (self.path / MANIFEST).exists():
+                    for made in new:
+                        if made.is_dir() and not any(made.iterdir()):
+                            made.rmdir()
+
+    def _begin(self) -> None:
+        for left in self.path.rglob(".partial-*"):
+            left.unlink()
+        if not (self.path / MANIFEST).exists():
+            if any(entry.name != LOCK for entry in self.path.iterdir()):
+                raise OutputError(
+                    f"'{self.path}' holds something else", "give an empty or a new directory"
+                )
+            self._write_manifest(finished=False)
+            return
+        known = read_manifest(self.path)
+        if known["key"] != self.plan.key:
+            what = _difference(known["plan"], self.plan.record())
+            raise InputError(
+                f"'{self.path}' holds a sweep with another configuration ({what})",
+                "give another directory, or the configuration it was begun with",
+            )
+        self.finished = {n for n in range(self.plan.chunks) if self.file(n).exists()}
+
+    def file(self, chunk: int) -> Path:
+        """Where the rows of a chunk are."""
+        model, _, _ = self.plan.of_chunk(chunk)
+        folder = self.path / ROWS / f"model={quote(model.name, safe='')}"
+        return folder / f"part-{chunk % self.plan.chunks_each:06d}.parquet"
+
+    def add(self, chunk: int, part: Part) -> None:
+        """Keep a finished chunk."""
+        file = self.file(chunk)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, part.content)
+        self.finished.add(chunk)
+
+    def finish(self) -> dict[str, Any]:
+        """Note that all chunks are there, and return what they are together."""
+        parts = [read_digest(self.file(n)) for n in sorted(self.finished)]
+        outcomes: Counter[str] = Counter()
+        for part in parts:
+            outcomes.update(part.outcomes)
+        found = {
+            "rows": sum(part.rows for part in parts),
+            "outcomes": dict(sorted(outcomes.items())),
+            "strides": sum(part.strides for part in parts),
+            "digest": hashlib.sha256("".join(part.digest for part in parts).encode()).hexdigest(),
+        }
+        self._write_manifest(finished=True, **found)
+        return found
+
+    def _write_manifest(self, **more: Any) -> None:
+        manifest = {
+            "schema_version": SCHEMA_VERSION,
+            "kind": "sweep",
+            "key": self.plan.key,
+            "plan": self.plan.record(),
+            "chunks": self.plan.chunks,
+            "made_with": made_with(),
+            **more,
+        }
+        text = json.dumps(manifest, indent=2, allow_nan=False) + "\n"
+        write_whole(self.path / MANIFEST, text.encode())
+
+
+def write_whole(file: Path, content: bytes) -> None:
+    """Write a file under another name, then rename it; on failure nothing is left."""
+    partial = file.with_name(f".partial-{file.name}")
+    try:
+        with partial.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        partial.replace(file)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """The manifest of a directory. Raises `InputError` if there is none."""
+    try:
+        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+    except OSError as failure:
+        raise InputError(
+            f"'{path}' has no manifest ({failure.strerror})",
+            "give a directory made by 'flexspine sweep'",
+        ) from None
+    except ValueError:
+        manifest = None
+    if not (isinstance(manifest, dict) and {"key", "plan", "made_with"} <= manifest.keys()):
+        raise InputError(f"the manifest in '{path}' is damaged", "begin the sweep anew")
+    return manifest
+
+
+def read_digest(file: Path) -> About:
+    """What a finished file says of its rows. Raises `InputError`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        about = pq.read_metadata(file)
+        tally = json.loads(about.metadata[TALLY])
+        digest = about.metadata[DIGEST].decode()
+        return About(about.num_rows, digest, tally["outcomes"], tally["strides"])
+    except (pa.ArrowInvalid, KeyError, TypeError, ValueError):
+        raise InputError(f"'{file}' is damaged", "delete it; the sweep makes it anew") from None
+
+
+def made_with() -> dict[str, str]:
+    """Versions and processor, on which the last bits of results depend."""
+    about = {"flexspine": __version__, "python": platform.python_version()}
+    return {**about, **{name: version(name) for name in LIBRARIES}, "processor": _processor()}
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def _difference(before: Any, now: Any, where: str = "") -> str:
+    """The first thing in which two records differ."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for name in [*before, *(n for n in now if n not in before)]:
+            if before.get(name) != now.get(name):
+                inner = f"{where}.{name}" if where else name
+                return _difference(before.get(name), now.get(name), inner)
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        for number, (one, other) in enumerate(zip(before, now, strict=True)):
+            if one != other:
+                return _difference(one, other, f"{where}[{number}]")
+    return f"{where} was {shortened(before)} and is {shortened(now)}"

@@ -1,0 +1,130 @@
+"""Sweeps: chunks of a plan done by workers, kept as they come, gone on with after a crash."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexspine.errors import InputError
+from flexspine.models.simulation import check_count
+from flexspine.studies.plan import Plan, read_plan
+from flexspine.studies.store import Store, read_digest, read_manifest
+from flexspine.studies.tasks import do_chunk
+from flexspine.workers.crew import Crew
+from flexspine.workers.local import LocalWorkers
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A finished sweep: where it is, and what its rows amount to.
+
+    ``outcomes`` counts rows, ``strides`` those completed; ``digest`` is of all rows;
+    ``made`` tells how many of its chunks were made just now, in ``seconds``.
+    """
+
+    path: Path
+    plan: Plan
+    rows: int
+    outcomes: Mapping[str, int]
+    strides: int
+    digest: str
+    made: int
+    seconds: float
+
+    @property
+    def files(self) -> list[Path]:
+        """Its Parquet files, in order."""
+        store = Store(self.path, self.plan)
+        return [store.file(chunk) for chunk in range(self.plan.chunks)]
+
+
+def sweep(
+    plan: Plan | str | Path,
+    out: str | Path,
+    *,
+    processes: int = 1,
+    client: Any = None,
+    progress: Callable[[int, int], None] = lambda _done, _all: None,
+) -> Sweep:
+    """Do all that a plan asks for and keep the rows in the directory ``out``.
+
+    ``plan`` is one or the TOML file of one. Interrupted or killed, the same call goes on with the
+    same directory. ``processes`` are local; ``client`` is a Dask client, or a scheduler's address
+    such as ``tcp://host:8786``, in their place. ``progress`` is told how many points are done, and
+    of how many. Raises `InputError`, and `MachineError` where workers fail.
+    """
+    plan = plan if isinstance(plan, Plan) else read_plan(plan)
+    begun = time.monotonic()
+    with Store(Path(out), plan).opened() as store:
+        missing = [n for n in range(plan.chunks) if n not in store.finished]
+        whole = plan.points * len(plan.models)
+        done = whole - sum(plan.of_chunk(n)[2] for n in missing)
+        progress(done, whole)
+        if missing:
+            with crew_of(min(check_count("processes", processes), len(missing)), client) as crew:
+                for chunk, part in crew.map(do_chunk, ((n, (plan, n)) for n in missing)):
+                    store.add(chunk, part)
+                    done += plan.of_chunk(chunk)[2]
+                    progress(done, whole)
+        found = store.finish()
+    return Sweep(Path(out), plan, **found, made=len(missing), seconds=time.monotonic() - begun)
+
+
+def crew_of(processes: int, client: Any) -> Crew:
+    """The workers: a Dask cluster if there is a client, local processes otherwise."""
+    if client is None:
+        return LocalWorkers(processes)
+    from flexspine.workers.cluster import DaskWorkers
+
+    return DaskWorkers(client)
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """Whether a sweep came out the same: ``differing`` are chunks that did not.
+
+    ``changed`` tells, by name, what it was made with and what that is now, where they differ.
+    """
+
+    chunks: int
+    differing: tuple[int, ...]
+    changed: Mapping[str, tuple[str, str]]
+
+    @property
+    def same(self) -> bool:
+        """Whether every chunk came out bit for bit the same."""
+        return not self.differing
+
+
+def rerun(
+    path: str | Path,
+    *,
+    processes: int = 1,
+    client: Any = None,
+    progress: Callable[[int, int], None] = lambda _done, _all: None,
+) -> Rerun:
+    """Repeat a sweep from its manifest and compare every chunk with what is there.
+
+    Nothing is written. An unfinished sweep is repeated as far as it got. Raises as `sweep`.
+    """
+    from flexspine.studies.store import made_with
+
+    manifest = read_manifest(Path(path))
+    plan = Plan.revive(manifest["plan"])
+    store = Store(Path(path), plan)
+    chunks = [n for n in range(plan.chunks) if store.file(n).exists()]
+    if not chunks:
+        raise InputError(f"'{path}' has no finished chunk", "finish the sweep first")
+    differing: list[int] = []
+    with crew_of(min(check_count("processes", processes), len(chunks)), client) as crew:
+        jobs = ((n, (plan, n)) for n in chunks)
+        for count, (chunk, part) in enumerate(crew.map(do_chunk, jobs), start=1):
+            if part.digest != read_digest(store.file(chunk)).digest:
+                differing.append(chunk)
+            progress(count, len(chunks))
+    before, now = manifest["made_with"], made_with()
+    changed = {n: (before.get(n, ""), v) for n, v in now.items() if before.get(n) != v}
+    return Rerun(len(chunks), tuple(sorted(differing)), changed)

@@ -1,0 +1,202 @@
+"""One chunk of a sweep: its rows, as a finished Parquet file in memory."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections import Counter
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexspine.errors import InputError, ParameterError
+from flexspine.gaits.continuation import trace_branch
+from flexspine.gaits.gait import Gait, examine
+from flexspine.gaits.search import DEFAULT_STARTS, find_gaits
+from flexspine.gaits.stability import floquet_multipliers
+from flexspine.models.many import make_cases, run_cases
+from flexspine.models.model import Model
+from flexspine.models.presets import load_model
+from flexspine.studies.following import STEP, LostGaitError, carried
+from flexspine.studies.plan import GAITS, RUNS, Plan
+from flexspine.studies.store import DIGEST, TALLY, Part
+from flexspine.studies.tables import Row, gait_row
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+FOUND, NONE = "found", "none"
+
+# Columns that hold no real numbers.
+_TEXTS = {"outcome", "reason", "phases", "family", "floquet_multipliers"}
+_COUNTS = {"point", "strides", "gait"}
+_FLAGS = {"stable", "confirmed"}
+
+# The gait by which the columns of gaits are known.
+_SAMPLE = "kamimura2015-flexible"
+
+
+def do_chunk(work: tuple[Plan, int]) -> Part:
+    """Do the task at the points of a chunk."""
+    plan, chunk = work
+    table = _runs(plan, chunk) if plan.task == RUNS else _gaits(plan, chunk)
+    return _part(table)
+
+
+def column_of(axis: str) -> str:
+    """The column with the values of an axis, such as ``at_spine_stiffness``."""
+    return f"at_{axis.replace('.', '_')}"
+
+
+def _runs(plan: Plan, chunk: int) -> pa.Table:
+    import pyarrow as pa
+
+    model, first, count = plan.of_chunk(chunk)
+    points = plan.at(chunk)
+    own = {name: column for name, column in points.items() if name in model.numbers}
+    cases = make_cases(model, own or {"height": np.full(count, model.apex["height"])})
+    columns = run_cases(cases, plan.options.get("strides", 1), plan.tolerance)
+    given = {column_of(name): column for name, column in own.items()}
+    apexes = [f"apex_{name}" for each in plan.models for name in each.apex]
+    names = ["point", *(column_of(axis.name) for axis in plan.axes), "outcome", "strides"]
+    names += ["duration", "distance", "apex_time", *dict.fromkeys(apexes)]
+    names += [name for name in columns if name not in names]
+    made = {"point": np.arange(first, first + count), **given, **columns}
+    schema = pa.schema([(name, _type(name)) for name in names])
+    nothing = pa.nulls(count)
+    arrays = [
+        pa.array(made[field.name]).cast(field.type)
+        if field.name in made
+        else nothing.cast(field.type)
+        for field in schema
+    ]
+    return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _gaits(plan: Plan, chunk: int) -> pa.Table:
+    import pyarrow as pa
+
+    rows = list(_followed(plan, chunk) if plan.task == GAITS else _searched(plan, chunk))
+    names = ["point", *(column_of(axis.name) for axis in plan.axes), "outcome", "reason", "gait"]
+    schema = pa.schema([(name, _type(name)) for name in [*names, *_gait_columns()]])
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
+def _type(name: str) -> Any:
+    import pyarrow as pa
+
+    if name in _TEXTS:
+        return pa.string()
+    if name in _COUNTS:
+        return pa.int64()
+    return pa.bool_() if name in _FLAGS else pa.float64()
+
+
+@lru_cache
+def _gait_columns() -> tuple[str, ...]:
+    gait = examine(load_model(_SAMPLE))
+    return tuple(gait_row(gait, floquet_multipliers(gait)))
+
+
+def _searched(plan: Plan, chunk: int) -> Iterator[Row]:
+    """Every gait found at every point of a chunk, or one row that says that there is none."""
+    model, first, count = plan.of_chunk(chunk)
+    points, options = plan.at(chunk), plan.options
+    for i in range(count):
+        given = {n: float(c[i]) for n, c in points.items()}
+        row: Row = {"point": first + i, **{column_of(n): v for n, v in given.items()}}
+        seed = np.random.SeedSequence((plan.seed, chunk // plan.chunks_each, first + i))
+        try:
+            body, fixed = _request(model, given, dict(options.get("fixed", {})), plan.tolerance)
+            search = find_gaits(
+                body,
+                fixed,
+                symmetric=options.get("symmetric"),
+                starts=options.get("starts", DEFAULT_STARTS),
+                seed=int(seed.generate_state(1)[0]),
+                tolerance=plan.tolerance,
+            )
+        except InputError as failure:
+            yield {**row, "outcome": NONE, "reason": failure.message}
+            continue
+        if not search.gaits:
+            yield {**row, "outcome": NONE, "reason": search.advice}
+        for number, gait in enumerate(search.gaits):
+            yield {**row, **_found(gait), "gait": number}
+
+
+def _request(
+    model: Model, given: dict[str, float], fixed: dict[str, float], tolerance: float
+) -> tuple[Model, dict[str, float]]:
+    """The body to search gaits of and what is fixed: by default the model's own gait's."""
+    parameters = {n: v for n, v in given.items() if n in model.parameter_names}
+    body = model.with_values(parameters) if parameters else model
+    if not fixed:
+        own = examine(model, tolerance=tolerance)
+        if own.flaw is not None:
+            raise ParameterError(f"the start of '{model.name}' is no gait", "say what is fixed")
+        fixed = own.quantities
+    return body, {**fixed, **{n: v for n, v in given.items() if n not in parameters}}
+
+
+def _followed(plan: Plan, chunk: int) -> Iterator[Row]:
+    """The gait at every point of a line, followed from the model's own."""
+    model, first, count = plan.of_chunk(chunk)
+    points, over = plan.at(chunk), plan.axes[-1].name
+    line = points[over]
+    rows: list[Row] = [
+        {"point": first + i, **{column_of(n): float(c[i]) for n, c in points.items()}}
+        for i in range(count)
+    ]
+    try:
+        gait = examine(model, tolerance=plan.tolerance)
+        if gait.flaw is not None:
+            raise LostGaitError(f"the start of '{model.name}' is no gait: {gait.flaw}")
+        for name, values in points.items():
+            if name != over:
+                gait = carried(gait, name, float(values[0]))
+        low, high = float(line.min()), float(line.max())
+        here = {**gait.model.numbers, **gait.quantities}[over]
+        gait = carried(gait, over, min(max(here, low), high))
+        symmetric = plan.options.get("symmetric")
+        branch = trace_branch(
+            gait, over, bounds=(low, high), symmetric=symmetric, longest_step=STEP
+        )
+    except (LostGaitError, InputError) as failure:
+        for row in rows:
+            yield {**row, "outcome": NONE, "reason": str(failure)}
+        return
+    for row, value in zip(rows, line, strict=True):
+        there = branch.at(float(value))
+        if not there:
+            yield {**row, "outcome": NONE, "reason": "; ".join(branch.ends)}
+            continue
+        found = gait_row(there[0].gait, there[0].stability)
+        yield {**row, **found, "outcome": FOUND, "gait": 0}
+
+
+def _found(gait: Gait) -> Row:
+    return {**gait_row(gait, floquet_multipliers(gait)), "outcome": FOUND}
+
+
+def _part(table: pa.Table) -> Part:
+    """A table as a file, with a digest of its rows and what they amount to."""
+    import pyarrow.parquet as pq
+
+    digest = hashlib.sha256()
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        digest.update(name.encode())
+        if column.type == _type("duration"):
+            digest.update(column.to_numpy().tobytes())
+        else:
+            digest.update(json.dumps(column.to_pylist()).encode())
+    tally = Counter(table["outcome"].to_pylist())
+    strides = int(sum(table["strides"].to_pylist())) if "strides" in table.column_names else 0
+    told = json.dumps({"outcomes": tally, "strides": strides})
+    table = table.replace_schema_metadata({DIGEST: digest.hexdigest(), TALLY: told})
+    stream = io.BytesIO()
+    pq.write_table(table, stream, compression="zstd")
+    return Part(stream.getvalue(), table.num_rows, digest.hexdigest())
