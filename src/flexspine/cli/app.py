@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from flexspine._version import __version__
-from flexspine.cli import bound, branch, cache, equations, gait, presets, study
+from flexspine.cli import bound, branch, cache, equations, gait, presets, study, sweep
 from flexspine.cli.output import fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
 
@@ -33,6 +33,8 @@ app.command("bound")(bound.bound)
 app.command("gait")(gait.gait)
 app.command("branch")(branch.branch)
 app.command("study")(study.study)
+app.command("sweep")(sweep.sweep)
+app.command("rerun")(sweep.rerun)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
 app.add_typer(cache.app, name="cache")

@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 
 from flexspine.errors import InputError, ParameterError
+from flexspine.gaits.gait import examine
 from flexspine.hybrid.compile import Array
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.parameters import is_number
+
+# What is known of a gait only.
+OF_GAITS = ("energy", "mean_speed")
 
 GRID, RANDOM, SOBOL = "grid", "random", "sobol"
 METHODS = (GRID, RANDOM, SOBOL)
@@ -84,6 +88,11 @@ class Axis:
         assert room is not None
         return own - room, own + room
 
+    def own(self, model: Model) -> float:
+        """The value of a model that the axis is about, if it is about one."""
+        about = self.around is not None or self.within is not None
+        return own_value(model, self.name) if about else float("nan")
+
     def grid(self, own: float) -> Array:
         """Its values on a grid."""
         if self.values:
@@ -103,13 +112,24 @@ class Axis:
 
 
 def own_value(model: Model, name: str) -> float:
-    """A model's own value of what an axis varies; NaN if it has no such thing."""
-    return {**model.numbers}.get(name, float("nan"))
+    """A model's own value of what an axis varies; NaN if it has no such thing.
+
+    Raises `ParameterError` for the mean speed or the energy of a model that starts on no gait.
+    """
+    if name not in OF_GAITS:
+        return {**model.numbers}.get(name, float("nan"))
+    gait = examine(model)
+    if gait.flaw is not None:
+        raise ParameterError(
+            f"'{model.name}' has no {name} of its own, as it starts on no gait",
+            f"give {name} as {{low = ..., high = ...}}",
+        )
+    return gait.quantities[name]
 
 
 def grid_points(model: Model, axes: tuple[Axis, ...], first: int, count: int) -> dict[str, Array]:
     """Points of a grid by number; the last axis changes fastest."""
-    lines = [axis.grid(own_value(model, axis.name)) for axis in axes]
+    lines = [axis.grid(axis.own(model)) for axis in axes]
     places = np.unravel_index(np.arange(first, first + count), [len(line) for line in lines])
     return {axis.name: line[place] for axis, line, place in zip(axes, lines, places, strict=True)}
 
@@ -125,15 +145,12 @@ def sampled_points(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of lengths that are no powers of two
             engine = qmc.Sobol(len(axes), bits=SOBOL_BITS, rng=np.random.default_rng(sequence))
-            shares = engine.fast_forward(first).random(count)
+            shares = (engine.fast_forward(first) if first else engine).random(count)
     else:
         bits = np.random.PCG64(sequence)
         bits.advance(first * len(axes))
         shares = np.random.Generator(bits).random((count, len(axes)))
-    return {
-        axis.name: axis.sample(own_value(model, axis.name), shares[:, i])
-        for i, axis in enumerate(axes)
-    }
+    return {axis.name: axis.sample(axis.own(model), shares[:, i]) for i, axis in enumerate(axes)}
 
 
 def grid_size(axes: tuple[Axis, ...]) -> int:

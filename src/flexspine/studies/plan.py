@@ -22,7 +22,15 @@ from flexspine.models.presets import load_model
 from flexspine.models.registry import find_kind
 from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
 from flexspine.parameters import build, flattened, is_number, values
-from flexspine.studies.axes import GRID, METHODS, Axis, grid_points, grid_size, sampled_points
+from flexspine.studies.axes import (
+    GRID,
+    METHODS,
+    OF_GAITS,
+    Axis,
+    grid_points,
+    grid_size,
+    sampled_points,
+)
 
 RUNS, SEARCHES, GAITS = "runs", "searches", "gaits"
 TASKS = (RUNS, SEARCHES, GAITS)
@@ -268,10 +276,11 @@ def _check_options(plan: Plan) -> None:
 
 def _check_axes(plan: Plan, model: Model) -> None:
     """Try the ends of every axis."""
-    quantities = {"energy", "mean_speed"} if plan.task != RUNS else set()
+    quantities = set(OF_GAITS) if plan.task != RUNS else set()
     anywhere = {name for each in plan.models for name in each.numbers}
     for axis in plan.axes:
         if axis.name in quantities:
+            axis.own(model)
             continue
         if axis.name not in model.numbers:
             if axis.name in anywhere:

@@ -1,0 +1,143 @@
+"""``flexspine sweep`` and ``flexspine rerun``: many runs or gaits, kept as they come."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.options import Json
+from flexspine.cli.output import counting, print_json
+
+if TYPE_CHECKING:
+    from flexspine.studies.sweep import Sweep
+
+Processes = Annotated[
+    int | None,
+    typer.Option(
+        help="Processes on this machine (default: one a core). Results do not depend on them."
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="tcp://HOST:PORT", help="Use the workers of this Dask scheduler instead."),
+]
+
+
+def sweep(
+    plan: Annotated[Path, typer.Argument(metavar="FILE.toml", help="What to do.")],
+    out: Annotated[Path, typer.Option(help="Keep the rows in this directory.")],
+    processes: Processes = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+) -> int:
+    """Simulate, or find gaits, at every point of a grid or a sample, and keep what comes of it.
+
+    The file names models and axes, a task (runs, searches, gaits) and its options. Rows land in
+    Parquet files in DIR/rows, a chunk at a time. Interrupted or killed, the same command goes on.
+    Exit code 0: done; 2: bad input; 3: the machine or its workers failed; 130: interrupted.
+
+    Examples:
+        flexspine sweep examples/million_strides.toml --out results/million
+
+        flexspine sweep FILE.toml --out DIR --scheduler tcp://node1:8786
+    """
+    from flexspine.studies.sweep import sweep as carry_out
+
+    with unfinished_is_kept(out), counting("points") as progress:
+        done = carry_out(
+            plan, out, processes=processes or cores(), client=scheduler, progress=progress
+        )
+    if json:
+        print_json(_record(done))
+        return 0
+    counts = ", ".join(f"{count} {name}" for name, count in done.outcomes.items())
+    strides = f", {done.strides} strides" if done.strides else ""
+    print(f"{done.rows} rows ({counts}){strides} in {done.seconds:.1f} s")
+    print(f"rows in {out / 'rows'}")
+    return 0
+
+
+def rerun(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What 'flexspine sweep' made.")],
+    processes: Processes = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+) -> int:
+    """Repeat a sweep from its manifest, and say whether it came out the same, bit for bit.
+
+    Nothing is written. Exit code 0: the same; 1: not the same; 2: bad input; 3: the machine or its
+    workers failed; 130: interrupted.
+
+    Examples:
+        flexspine rerun results/million
+    """
+    from flexspine.studies.sweep import rerun as repeat
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with counting("chunks") as progress:
+        found = repeat(
+            directory, processes=processes or cores(), client=scheduler, progress=progress
+        )
+    if json:
+        print_json(
+            {
+                "schema_version": SCHEMA_VERSION,
+                "flexspine": __version__,
+                "same": found.same,
+                "chunks": found.chunks,
+                "differing": list(found.differing),
+                "changed": {n: {"was": b, "is": a} for n, (b, a) in found.changed.items()},
+            }
+        )
+    elif found.same:
+        print(f"the same: all {found.chunks} chunks")
+    else:
+        print(f"not the same: {len(found.differing)} of {found.chunks} chunks differ")
+        for name, (before, now) in found.changed.items():
+            print(f"  {name} was {before}, is {now}")
+    return 0 if found.same else 1
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def unfinished_is_kept(out: Path) -> Iterator[None]:
+    """Let work be interrupted, and tell then where it goes on from."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(
+            f"flexspine: what is finished is in '{out}'; the same command goes on from it",
+            file=sys.stderr,
+        )
+        raise
+
+
+def _record(done: Sweep) -> dict[str, object]:
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "flexspine": __version__,
+        "out": str(done.path),
+        "task": done.plan.task,
+        "models": [model.name for model in done.plan.models],
+        "points": done.plan.points * len(done.plan.models),
+        "chunks": done.plan.chunks,
+        "made": done.made,
+        "rows": done.rows,
+        "outcomes": dict(done.outcomes),
+        "strides": done.strides,
+        "digest": done.digest,
+        "seconds": done.seconds,
+    }
