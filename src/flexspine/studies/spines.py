@@ -85,7 +85,7 @@ class Specimen:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class StiffnessSweep:
     """Gaits over spine stiffness at one mean speed.
 
     ``branch`` continues the published gait; ``stiff`` are gaits of ever stiffer spines next to
@@ -104,7 +104,7 @@ class SpineStudy:
 
     setting: Setting
     specimens: tuple[Specimen, ...]
-    sweeps: tuple[Sweep, ...]
+    sweeps: tuple[StiffnessSweep, ...]
 
     def specimen(self, body: str, stiffness: float | None = None) -> Specimen:
         """Return one of the specimens."""
@@ -211,7 +211,7 @@ def _start(body: str, setting: Setting) -> Gait:
 
 def _sweep(
     study: SpineStudy, speed: float, trace: Callable[[Gait, str, tuple[float, float], str], Branch]
-) -> Sweep | None:
+) -> StiffnessSweep | None:
     """Follow the stiffest specimen that runs at this speed over all stiffnesses."""
     setting = study.setting
     starts = [p for s in reversed(study.flexible) if (p := s.at(speed)) is not None]
@@ -221,7 +221,7 @@ def _sweep(
     branch = trace(starts[0].gait, "spine.stiffness", bounds, f"over stiffness at {speed:g}")
     locked = study.specimen(LOCKED).at(speed)
     stiff = () if locked is None else tuple(_stiff(starts[0].gait.model, locked.gait, setting))
-    return Sweep(speed, branch, stiff, locked)
+    return StiffnessSweep(speed, branch, stiff, locked)
 
 
 def _stiff(model: Model, locked: Gait, setting: Setting) -> Iterator[tuple[float, Gait, Stability]]:

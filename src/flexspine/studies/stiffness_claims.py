@@ -9,7 +9,7 @@ from typing import Any
 from flexspine.gaits.family import BranchPoint
 from flexspine.gaits.gait import Gait
 from flexspine.studies.comparison import NO_DIFFERENCE, peak
-from flexspine.studies.spines import FLEXIBLE, LOCKED, RIGID, SpineStudy, Sweep
+from flexspine.studies.spines import FLEXIBLE, LOCKED, RIGID, SpineStudy, StiffnessSweep
 from flexspine.studies.verdict import DEPENDS, HOLDS, Verdict, decided
 
 NO_SWEEP = "no speed at which to vary the stiffness"
@@ -45,7 +45,7 @@ class _Sides:
     other: tuple[BranchPoint, ...]
 
     @classmethod
-    def of(cls, sweep: Sweep) -> _Sides:
+    def of(cls, sweep: StiffnessSweep) -> _Sides:
         points = sweep.branch.points
         softest = min(range(len(points)), key=lambda i: points[i].value)
         return cls(points[softest:], points[:softest])
@@ -134,7 +134,7 @@ class _StiffCase:
         )
 
 
-def _stiff_case(study: SpineStudy, sweep: Sweep) -> _StiffCase | None:
+def _stiff_case(study: SpineStudy, sweep: StiffnessSweep) -> _StiffCase | None:
     if not sweep.stiff or sweep.locked is None:
         return None
     stiffness, gait, stability = sweep.stiff[0]
