@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from flexspine.gaits.stability import Stability, floquet_multipliers
     from flexspine.gaits.switching import switch_branch
     from flexspine.models.dataset import to_dataset
-    from flexspine.models.many import Ensemble, simulate_many
+    from flexspine.models.many import Ensemble, simulate_many, stream_many
     from flexspine.models.model import Model
     from flexspine.models.presets import load_model, preset_names
     from flexspine.models.simulation import Run, simulate
@@ -59,6 +59,7 @@ _HOMES = {
     "save_gait": "gaits.files",
     "simulate": "models.simulation",
     "simulate_many": "models.many",
+    "stream_many": "models.many",
     "stride_map": "gaits.return_map",
     "strip": "report.animation",
     "summarize": "gaits.measures",
@@ -98,6 +99,7 @@ __all__ = [
     "save_gait",
     "simulate",
     "simulate_many",
+    "stream_many",
     "stride_map",
     "strip",
     "summarize",

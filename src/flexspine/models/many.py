@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import pi
 from typing import Any
@@ -103,18 +103,60 @@ def simulate_many(
     without a change to the results. Raises `UnknownNameError` and `ParameterError`.
     """
     cases = make_cases(model, {**(states or {}), **(parameters or {})})
-    wanted, workers = check_count("strides", strides), check_count("processes", processes)
-    check_between("tolerance", tolerance, *TOLERANCES)
     parts = [slice(at, at + PIECE) for at in range(0, len(cases), PIECE)]
-    jobs = ((number, (cases.piece(p), wanted, tolerance)) for number, p in enumerate(parts))
-    done: dict[int, Columns] = {}
-    with LocalWorkers(min(workers, len(parts))) as crew:
-        for number, columns in crew.map(_run_piece, jobs):
-            done[number] = columns
-            progress(len(done) / len(parts))
-    pieces = [done[number] for number in range(len(parts))]
+    pieces = []
+    workers = min(check_count("processes", processes), len(parts))
+    for piece in _stream(map(cases.piece, parts), strides, tolerance, workers):
+        pieces.append(piece.columns)
+        progress(len(pieces) / len(parts))
     columns = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
-    return Ensemble(cases, wanted, tolerance, columns)
+    return Ensemble(cases, strides, tolerance, columns)
+
+
+def stream_many(
+    model: Model,
+    batches: Iterable[Mapping[str, ArrayLike]],
+    *,
+    strides: int = 1,
+    tolerance: float = DEFAULT_TOLERANCE,
+    processes: int = 1,
+) -> Iterator[Ensemble]:
+    """Simulate batch after batch, each given as ``states`` and ``parameters`` of `simulate_many`.
+
+    Batches are taken as they are needed and given back in order, so that memory does not grow
+    with their number. Raises as `simulate_many`.
+    """
+    return _stream((make_cases(model, b) for b in batches), strides, tolerance, processes)
+
+
+def _stream(
+    batches: Iterable[Cases], strides: int, tolerance: float, processes: int
+) -> Iterator[Ensemble]:
+    """Check what is asked for at once, and do it when it is wanted."""
+    check_between("tolerance", tolerance, *TOLERANCES)
+    workers = LocalWorkers(check_count("processes", processes))
+    return _in_order(batches, check_count("strides", strides), tolerance, workers)
+
+
+def _in_order(
+    batches: Iterable[Cases], strides: int, tolerance: float, workers: LocalWorkers
+) -> Iterator[Ensemble]:
+    taken: dict[int, Cases] = {}
+    done: dict[int, Columns] = {}
+
+    def jobs() -> Iterator[tuple[int, tuple[Cases, int, float]]]:
+        for number, cases in enumerate(batches):
+            taken[number] = cases
+            yield number, (cases, strides, tolerance)
+
+    with workers as crew:
+        following = 0
+        for number, columns in crew.map(_run_piece, jobs()):
+            done[number] = columns
+            while following in done:
+                cases = taken.pop(following)
+                yield Ensemble(cases, strides, tolerance, done.pop(following))
+                following += 1
 
 
 def make_cases(model: Model, given: Mapping[str, ArrayLike]) -> Cases:
