@@ -56,7 +56,7 @@ class Starts:
         return len(self.states.T)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Ends:
     """How k runs ended.
 
@@ -66,7 +66,7 @@ class Ends:
     (t, k) of the tracked observables. ``alone`` counts how often a run had to be done by itself.
     """
 
-    outcomes: tuple[OutcomeKind, ...]
+    outcomes: list[OutcomeKind]
     kinds: NDArray[np.int8]
     crossings: NDArray[np.int64]
     time: Array
@@ -74,7 +74,22 @@ class Ends:
     section_time: Array
     section_states: Array
     largest: Array
-    alone: int
+    alone: int = 0
+
+    @classmethod
+    def none_yet(cls, starts: Starts, tracked: int) -> Ends:
+        """The ends of runs of which none has ended."""
+        total = len(starts)
+        return cls(
+            outcomes=[COMPLETED],
+            kinds=np.full(total, NONE, dtype=np.int8),
+            crossings=np.zeros(total, dtype=np.int64),
+            time=np.zeros(total),
+            states=starts.states.copy(),
+            section_time=np.zeros(total),
+            section_states=starts.states.copy(),
+            largest=np.zeros((tracked, total)),
+        )
 
 
 def run_many(lanes: LaneSystem, starts: Starts, crossings: int, *, pool: int = POOL) -> Ends:
@@ -90,7 +105,7 @@ class _Pool:
         self.lanes, self.system, self.starts, self.wanted = lanes, system, starts, wanted
         self.names = {name: number for number, name in enumerate(system.modes)}
         n, m, p = len(system.states), len(system.held), len(system.parameters)
-        self.n_held, total = m, len(starts)
+        self.n_held = m
         # In progress. Numbers are the held variables and then the parameters.
         self.states, self.numbers = np.zeros((n, size)), np.zeros((m + p, size))
         self.coefficients: dict[str, Array] = {}
@@ -101,14 +116,8 @@ class _Pool:
         self.soon = np.zeros(size, dtype=bool)  # an event is to be expected in the next step
         self.requires = [(system.places[s], v) for s, v in system.section.requires.items()]
         self.resets = [(system.places[s], v) for s, v in system.section.resets.items()]
-        # Results.
-        self.started, self.round, self.alone = 0, 0, 0
-        self.outcomes = [COMPLETED]
-        self.kinds = np.full(total, NONE, dtype=np.int8)
-        self.crossings = np.zeros(total, dtype=np.int64)
-        self.end_time, self.section_time = np.zeros(total), np.zeros(total)
-        self.end_states, self.section_states = starts.states.copy(), starts.states.copy()
-        self.largest = np.zeros((len(system.tracked), total))
+        self.started, self.round = 0, 0
+        self.ends = Ends.none_yet(starts, len(system.tracked))
 
     def run(self) -> Ends:
         while True:
@@ -124,17 +133,7 @@ class _Pool:
             self.round += 1
             if self.round % CHECK_ROUNDS == 0:
                 self._look_after()
-        return Ends(
-            tuple(self.outcomes),
-            self.kinds,
-            self.crossings,
-            self.end_time,
-            self.end_states,
-            self.section_time,
-            self.section_states,
-            self.largest,
-            self.alone,
-        )
+        return self.ends
 
     def _fill(self, free: Indices) -> None:
         """Start runs in free slots."""
@@ -225,7 +224,7 @@ class _Pool:
         """Keep the largest values so far."""
         runs = self.run_of[slots]
         for row, which in enumerate(mode.events.tracked):
-            best = self.largest[which]
+            best = self.ends.largest[which]
             best[runs] = np.maximum(best[runs], tops[row])
 
     def _happen(self, mode: LaneMode, slots: Indices, guards: Array) -> None:
@@ -251,20 +250,21 @@ class _Pool:
         for place, value in self.resets:
             self.numbers[place, slots] = value
         runs = self.run_of[slots]
-        self.crossings[runs] += 1
-        self.section_time[runs] = self.since[slots] = self.time[slots]
-        self.section_states[:, runs] = self.states[:, slots]
+        ends = self.ends
+        ends.crossings[runs] += 1
+        ends.section_time[runs] = self.since[slots] = self.time[slots]
+        ends.section_states[:, runs] = self.states[:, slots]
         self.round_of[slots] = self.round
-        self._end(slots[self.crossings[runs] == self.wanted], COMPLETED)
+        self._end(slots[ends.crossings[runs] == self.wanted], COMPLETED)
 
     def _end(self, slots: Indices, outcome: OutcomeKind) -> None:
         """Note how runs ended, and free their slots."""
-        if outcome not in self.outcomes:
-            self.outcomes.append(outcome)
-        runs = self.run_of[slots]
-        self.kinds[runs] = self.outcomes.index(outcome)
-        self.end_time[runs] = self.time[slots]
-        self.end_states[:, runs] = self.states[:, slots]
+        ends, runs = self.ends, self.run_of[slots]
+        if outcome not in ends.outcomes:
+            ends.outcomes.append(outcome)
+        ends.kinds[runs] = ends.outcomes.index(outcome)
+        ends.time[runs] = self.time[slots]
+        ends.states[:, runs] = self.states[:, slots]
         self.mode[slots] = NONE
 
     def _look_after(self) -> None:
@@ -284,7 +284,7 @@ class _Pool:
         """Do by itself, up to the next crossing, what is out of the ordinary."""
         names = list(self.names)
         for slot in slots.tolist():
-            self.alone += 1
+            self.ends.alone += 1
             bound = BoundSystem(self.lanes.compiled, self.numbers[self.n_held :, slot].copy())
             start = HybridState(
                 float(self.time[slot]),

@@ -35,8 +35,9 @@ from flexspine.studies.axes import (
 RUNS, SEARCHES, GAITS = "runs", "searches", "gaits"
 TASKS = (RUNS, SEARCHES, GAITS)
 
-# Points in one piece of work, and in one file.
-CHUNKS = {RUNS: 16384, SEARCHES: 16}
+# What one piece of work and one file hold: some seconds of it.
+MOST_STRIDES, MOST_RUNS, FEWEST_RUNS = 400_000, 16384, 256
+SEARCHES_EACH = 16
 
 # What each task can be told, besides the tolerance.
 OPTIONS: dict[str, dict[str, type]] = {
@@ -81,7 +82,12 @@ class Plan:
         if self.task == GAITS:
             axis = self.axes[-1]
             return len(axis.values) or axis.steps or 1
-        return self.chunk or CHUNKS[self.task]
+        if self.chunk is not None:
+            return self.chunk
+        if self.task == SEARCHES:
+            return SEARCHES_EACH
+        runs = MOST_STRIDES // int(self.options.get("strides", 1))
+        return min(max(runs, FEWEST_RUNS), MOST_RUNS)
 
     @property
     def chunks_each(self) -> int:
