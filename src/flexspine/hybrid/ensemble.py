@@ -109,6 +109,8 @@ class _Pool:
         # In progress. Numbers are the held variables and then the parameters.
         self.states, self.numbers = np.zeros((n, size)), np.zeros((m + p, size))
         self.coefficients: dict[str, Array] = {}
+        # Most ensembles differ in their starts only; then there is less to gather.
+        self.shared = bool((starts.parameters == starts.parameters[:, :1]).all())
         self.mode, self.run_of = np.full(size, NONE), np.zeros(size, dtype=int)
         self.time, self.since, self.longest = (np.zeros(size) for _ in range(3))
         self.crowded, self.round_of = (np.zeros(size, dtype=int) for _ in range(2))
@@ -151,6 +153,8 @@ class _Pool:
             kept[slots] = 0
         self.longest[slots], self.round_of[slots] = np.inf, self.round
         for name, coefficients in self.coefficients.items():
+            if self.shared:
+                break
             mode = self.lanes.mode(name)
             coefficients[slots] = mode.coefficients(starts.parameters.take(runs, axis=1))
         self._alone(slots[self._close_to_guards(slots)])
@@ -168,19 +172,34 @@ class _Pool:
                 close |= ~(value > CLOSE) & (by_level | ~(value < -CLOSE))
         return close
 
-    def _coefficients(self, mode: LaneMode) -> Array:
-        """The coefficients of a mode's flow for every slot, made when first needed."""
+    def _numbers(self, lanes: Indices) -> Array:
+        """Held variables and parameters of some slots."""
+        if not self.shared:
+            return self.numbers.take(lanes, axis=1)
+        numbers = np.empty((len(self.numbers), len(lanes)))
+        numbers[: self.n_held] = self.numbers[: self.n_held].take(lanes, axis=1)
+        numbers[self.n_held :] = self.numbers[self.n_held :, :1]
+        return numbers
+
+    def _folded(self, mode: LaneMode, lanes: Indices) -> Array:
+        """The coefficients of a mode's flow for some slots, or one row if all have the same."""
         if mode.name not in self.coefficients:
-            self.coefficients[mode.name] = mode.coefficients(self.numbers[self.n_held :])
-        return self.coefficients[mode.name]
+            parameters = self.numbers[self.n_held :, : 1 if self.shared else None]
+            self.coefficients[mode.name] = mode.coefficients(parameters)
+        known = self.coefficients[mode.name]
+        return known if self.shared else known.take(lanes, axis=0)
 
     def _advance(self, mode: LaneMode, slots: Indices) -> None:
         """Let the runs in some slots, all in one mode, take a step up to their next event."""
         soon = self.soon[slots]
         first, others = _padded(slots[soon], mode), _padded(slots[~soon], mode)
         lanes, kept = np.concatenate([first, others]), len(first)
-        states, numbers = self.states.take(lanes, axis=1), self.numbers.take(lanes, axis=1)
-        folded, longest = self._coefficients(mode).take(lanes, axis=0), self.longest[lanes]
+        states, numbers, longest = (
+            self.states.take(lanes, axis=1),
+            self._numbers(lanes),
+            self.longest[lanes],
+        )
+        folded = self._folded(mode, lanes)
         end, lived, series = mode.flow(states, numbers, folded, longest, kept)
         found = mode.events.screen(states, end, lived, numbers)
         doubtful, happens = found.doubt != 0, (found.guard != NOTHING) | (found.top != 0)
@@ -199,8 +218,8 @@ class _Pool:
                 continue
             given, guard, whole = numbers.take(few, axis=1), found.guard[few], lived[few]
             if few is not known:
-                begin, coefficients = states.take(few, axis=1), folded.take(few, axis=0)
-                _, _, series = mode.flow(begin, given, coefficients, whole, len(few))
+                begin, own = states.take(few, axis=1), self._folded(mode, lanes[few])
+                _, _, series = mode.flow(begin, given, own, whole, len(few))
             series[-2] = np.where(guard == NOTHING, whole, found.share[few] * whole)
             series[-1] = guard
             seen = mode.events.look(series, given)

@@ -68,7 +68,8 @@ class LaneMode:
     ) -> tuple[Array, Array, Array]:
         """Take one step of every lane; their number has to be a multiple of ``width``.
 
-        ``held`` (m, k) or more rows, ``folded`` from `coefficients`; ``longest`` (k,) bounds the
+        ``held`` (m, k) or more rows, ``folded`` from `coefficients`, or one row of
+        them for all; ``longest`` (k,) bounds the
         steps, in s, as LONGEST does. Returns states (n, k), lengths (k,) in s and the Taylor
         series of the first ``kept`` lanes, shape (n (order + 1) + 2, kept), of which the last two
         rows are free.
@@ -104,9 +105,12 @@ class LaneMode:
     def _numbers(self, held: Array, folded: Array) -> Array:
         """What the integrator's parameters are, block by block: held variables, coefficients."""
         n, width = self.n_held, self.width
-        numbers = np.empty((len(folded) // width, n + folded.shape[1], width))
+        numbers = np.empty((held.shape[1] // width, n + self.n_coefficients, width))
         numbers[:, :n] = held[:n].reshape(n, -1, width).transpose(1, 0, 2)
-        numbers[:, n:] = folded.reshape(len(numbers), width, -1).transpose(0, 2, 1)
+        if len(folded) == 1:
+            numbers[:, n:] = folded[0, :, None]
+        else:
+            numbers[:, n:] = folded.reshape(len(numbers), width, -1).transpose(0, 2, 1)
         return numbers
 
 
