@@ -68,31 +68,33 @@ class LaneMode:
     ) -> tuple[Array, Array, Array]:
         """Take one step of every lane; their number has to be a multiple of ``width``.
 
-        ``held`` (m, k) or more rows, ``folded`` from `coefficients`, or one row of
-        them for all; ``longest`` (k,) bounds the
-        steps, in s, as LONGEST does. Returns states (n, k), lengths (k,) in s and the Taylor
-        series of the first ``kept`` lanes, shape (n (order + 1) + 2, kept), of which the last two
-        rows are free.
+        ``held`` (m, k) or more rows, ``folded`` from `coefficients`, or one row of them for all;
+        ``longest`` (k,) bounds the steps, in s, as LONGEST does. Returns states (n, k), lengths
+        (k,) in s and the Taylor series of the first ``kept`` lanes, shape (n (order + 1) + 2,
+        kept), of which the last two rows are free.
         """
         integrator, width = self._integrator, self.width
-        state, pars, length = integrator.state, integrator.pars, integrator.last_h
+        state, length = integrator.state, integrator.last_h
         taylor = integrator.tc.reshape(-1, width)
         blocks, numbers = _blocks(states, width), self._numbers(held, folded)
+        given = integrator.pars[: numbers.shape[1]]
         lengths, series = np.empty((len(blocks), width)), np.empty((len(taylor) + 2, kept))
         bounds = np.minimum(longest, LONGEST).reshape(-1, width)
         bounded = np.logical_or((bounds < LONGEST).any(axis=1), self._limited)
         limits = bounds.tolist() if bounded.any() else []
-        steps = zip(blocks, numbers, bounded.tolist(), strict=True)
-        for i, (here, given, limit) in enumerate(steps):
+        steps = zip(blocks, numbers, lengths, bounded.tolist(), strict=True)
+        for i, (here, own, lived, limit) in enumerate(steps):
             state[:] = here
-            pars[:] = given
+            given[:] = own
             keep = i * width < kept
             if limit:
                 integrator.step(limits[i], write_tc=keep)
+            elif keep:
+                integrator.step(write_tc=True)
             else:
-                integrator.step(write_tc=keep)
+                integrator.step()
             here[:] = state
-            lengths[i] = length
+            lived[:] = length
             if keep:
                 series[:-2, i * width : (i + 1) * width] = taylor
         # Flows are autonomous, and a time that is not finite would stick.
@@ -103,15 +105,12 @@ class LaneMode:
         return blocks.transpose(1, 0, 2).reshape(states.shape), lengths.reshape(-1), series
 
     def _numbers(self, held: Array, folded: Array) -> Array:
-        """What the integrator's parameters are, block by block: held variables, coefficients."""
-        n, width = self.n_held, self.width
-        numbers = np.empty((held.shape[1] // width, n + self.n_coefficients, width))
-        numbers[:, :n] = held[:n].reshape(n, -1, width).transpose(1, 0, 2)
+        """What changes of the integrator's parameters from block to block: the first of them."""
+        n, pars = self.n_held, self._integrator.pars
         if len(folded) == 1:
-            numbers[:, n:] = folded[0, :, None]
-        else:
-            numbers[:, n:] = folded.reshape(len(numbers), width, -1).transpose(0, 2, 1)
-        return numbers
+            pars[n:] = folded[0, :, None]
+            return _blocks(held[:n], self.width)
+        return _blocks(np.concatenate([held[:n], folded.T]), self.width)
 
 
 def _width(integrator: Any) -> int:
