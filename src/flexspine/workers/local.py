@@ -6,10 +6,13 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from types import ModuleType
 from typing import Any, Self
 
 from flexspine.errors import MachineError
@@ -82,7 +85,8 @@ class LocalWorkers:
             # A fresh interpreter: compiled code and its threads do not survive a fork.
             context = multiprocessing.get_context("spawn")
             self._pool = ProcessPoolExecutor(self._count, context, initializer=_prepare)
-        return self._pool.submit(function, work)
+        with _without_main():  # processes start with the first pieces
+            return self._pool.submit(function, work)
 
     def _replace(self) -> None:
         if self._pool is not None:
@@ -101,6 +105,20 @@ class LocalWorkers:
                 process.terminate()
         self._pool.shutdown(wait=True, cancel_futures=True)
         self._pool = None
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the script that runs: a fresh interpreter would run it again, guarded or not.
+
+    Nothing that is sent to workers lives there.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _prepare() -> None:
