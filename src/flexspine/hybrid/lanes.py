@@ -12,11 +12,13 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+import sympy as sp
 
 from flexspine.hybrid.cache import mend_cache
 from flexspine.hybrid.compile import Array, CompiledSystem
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.step_events import StepEvents
+from flexspine.hybrid.system import Mode
 
 # Bytes; the Taylor coefficients of all terms of all lanes of an integrator stay in fast memory.
 COEFFICIENTS = 160_000
@@ -25,8 +27,8 @@ COEFFICIENTS = 160_000
 REGISTERS = (2, 12)
 
 
-# s; where a field is so simple that its own steps have no end, guards turn in them unseen.
-LONGEST = 0.02
+# s; where neither field nor guards set an end to a step.
+LONGEST = 0.05
 
 
 class LaneMode:
@@ -43,10 +45,17 @@ class LaneMode:
         held = {s: hy.par[i] for i, s in enumerate(system.held)}
         known = {**dict(zip(system.states, states, strict=True)), **held}
         lower = Lowering(known, system.parameters, mode.definitions, len(held))
-        field = [(v, lower(mode.field[s])) for s, v in zip(system.states, states, strict=True)]
+        rates = {s: lower(mode.field[s]) for s in system.states}
+        field = list(zip(states, rates.values(), strict=True))
+        if _is_polynomial(mode):
+            # Its own steps are of any length; its guards come along, to be resolved by steps.
+            for i, guard in enumerate(mode.guards):
+                value = lower(guard.expression)
+                slope = [hy.diff(value, v) * rate for v, rate in field[: len(states)]]
+                field.append((hy.expression(f"g{i}"), hy.sum(slope)))
         self.width = _width(self.code.integrator)
         self._integrator = hy.taylor_adaptive_batch(
-            field, np.zeros((len(states), self.width)), tol=compiled.tolerance
+            field, np.zeros((len(field), self.width)), tol=compiled.tolerance
         )
         self._coefficients = compiled.coefficients(lower.coefficients)
         # Code that needs few numbers may not reach as far as all held variables.
@@ -73,9 +82,9 @@ class LaneMode:
         (k,) in s and the Taylor series of the first ``kept`` lanes, shape (n (order + 1) + 2,
         kept), of which the last two rows are free.
         """
-        integrator, width = self._integrator, self.width
-        state, length = integrator.state, integrator.last_h
-        taylor = integrator.tc.reshape(-1, width)
+        integrator, width, n = self._integrator, self.width, len(states)
+        state, length = integrator.state[:n], integrator.last_h
+        taylor = integrator.tc[:n].reshape(-1, width)
         blocks, numbers = _blocks(states, width), self._numbers(held, folded)
         given = integrator.pars[: numbers.shape[1]]
         lengths, series = np.empty((len(blocks), width)), np.empty((len(taylor) + 2, kept))
@@ -111,6 +120,19 @@ class LaneMode:
             pars[n:] = folded[0, :, None]
             return _blocks(held[:n], self.width)
         return _blocks(np.concatenate([held[:n], folded.T]), self.width)
+
+
+def _is_polynomial(mode: Mode) -> bool:
+    """Whether a field is polynomial in the states, so that its series may come to an end."""
+    moving = set(mode.field)
+    for symbol, expression in mode.definitions.items():
+        if expression.free_symbols & moving:
+            moving.add(symbol)
+    reached = [sp.sympify(rate) for rate in mode.field.values()]
+    for expression in reached:
+        named = [mode.definitions[s] for s in expression.free_symbols if s in mode.definitions]
+        reached += [each for each in named if each not in reached]
+    return all(expression.is_polynomial(*moving) for expression in reached)
 
 
 def _width(integrator: Any) -> int:
