@@ -12,7 +12,18 @@ from typing import Annotated, Any
 import typer
 
 from flexspine._version import __version__
-from flexspine.cli import bound, branch, cache, equations, gait, presets, study, sweep
+from flexspine.cli import (
+    basin,
+    bound,
+    branch,
+    cache,
+    equations,
+    gait,
+    gait_map,
+    presets,
+    study,
+    sweep,
+)
 from flexspine.cli.output import fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
 
@@ -35,6 +46,8 @@ app.command("branch")(branch.branch)
 app.command("study")(study.study)
 app.command("sweep")(sweep.sweep)
 app.command("rerun")(sweep.rerun)
+app.command("basin")(basin.basin)
+app.command("map")(gait_map.gait_map)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
 app.add_typer(cache.app, name="cache")

@@ -212,6 +212,12 @@ def _run_piece(work: tuple[Cases, int, float]) -> Columns:
     return run_cases(*work)
 
 
+def start_energies(cases: Cases) -> Array:
+    """Total energy of all cases at their start, in J."""
+    model, starts = _starts(cases)
+    return _energies(model, starts, starts.states)
+
+
 def run_cases(cases: Cases, strides: int, tolerance: float) -> Columns:
     """Simulate all cases in this process; returns the columns of an `Ensemble`."""
     model, starts = _starts(cases)
@@ -243,14 +249,7 @@ def _starts(cases: Cases) -> tuple[Model, Starts]:
 
 
 def _columns(model: Model, starts: Starts, ends: Ends) -> Columns:
-    names = np.array([kind.name for kind in ends.outcomes])
-    system, quantity = model.system, section_quantities(model.system)
-    energy = list(system.section.quantities).index("energy")
-
-    def energies(states: Array) -> Array:
-        found: Array = quantity.many(states, starts.held, starts.parameters)[energy]
-        return found
-
+    names, system = np.array([kind.name for kind in ends.outcomes]), model.system
     x, dissipated = (model.state_names.index(n) for n in ("com_x", "dissipated_energy"))
     return {
         "outcome": names[ends.kinds],
@@ -266,7 +265,15 @@ def _columns(model: Model, starts: Starts, ends: Ends) -> Columns:
             f"peak_grf_{name.removesuffix('_grf')}": peak
             for name, peak in zip(system.tracked, ends.largest, strict=True)
         },
-        "energy_start": energies(starts.states),
-        "energy_end": energies(ends.section_states),
+        "energy_start": _energies(model, starts, starts.states),
+        "energy_end": _energies(model, starts, ends.section_states),
         "dissipated": ends.states[dissipated],
     }
+
+
+def _energies(model: Model, starts: Starts, states: Array) -> Array:
+    """Total energy of all cases in flight at these states, in J."""
+    quantity, names = section_quantities(model.system), list(model.system.section.quantities)
+    values = quantity.many(states, starts.held, starts.parameters)
+    found: Array = values[names.index("energy")]
+    return found

@@ -12,6 +12,7 @@ import numpy as np
 from flexspine.errors import InputError, ParameterError
 from flexspine.gaits.gait import examine
 from flexspine.hybrid.compile import Array
+from flexspine.models.many import make_cases, start_energies
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.parameters import is_number
@@ -27,7 +28,7 @@ SOBOL_BITS = 32
 
 FORMS = (
     "write a list of values, {low = ..., high = ...}, {around = SHARE} or {within = AMOUNT}, "
-    "and steps = COUNT for a grid"
+    'and steps = COUNT for a grid; or speed = {keeps = "energy"}'
 )
 
 
@@ -36,7 +37,8 @@ class Axis:
     """What varies, and over which values: listed, or a range with ``steps`` points on a grid.
 
     A range is from ``low`` to ``high``, or about a model's own value: ``around`` it by a share, or
-    ``within`` an amount (SI, radians).
+    ``within`` an amount (SI, radians). One that ``keeps`` the energy follows from the others: it is
+    the apex speed at which a start has the energy of the model's own, 0 where it has more at rest.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Axis:
     around: float | None = None
     within: float | None = None
     steps: int | None = None
+    keeps: str | None = None
 
     @classmethod
     def read(cls, name: str, content: Any) -> Axis:
@@ -54,6 +57,8 @@ class Axis:
             if not content or not all(map(is_number, content)):
                 raise InputError(f"axis '{name}' is not a list of numbers", FORMS)
             return cls(name, tuple(map(float, content)))
+        if (name, content) == ("speed", {"keeps": "energy"}):
+            return cls(name, keeps="energy")
         keys = set(content) if isinstance(content, Mapping) else set()
         if keys - {"steps"} not in ({"low", "high"}, {"around"}, {"within"}):
             raise InputError(f"axis '{name}' is not understood", FORMS)
@@ -75,7 +80,7 @@ class Axis:
         """What a file would say of it."""
         if self.values:
             return list(self.values)
-        names = ("low", "high", "around", "within", "steps")
+        names = ("low", "high", "around", "within", "steps", "keeps")
         return {n: getattr(self, n) for n in names if getattr(self, n) is not None}
 
     def range(self, own: float) -> tuple[float, float]:
@@ -84,6 +89,8 @@ class Axis:
             return min(self.values), max(self.values)
         if self.low is not None and self.high is not None:
             return self.low, self.high
+        if self.keeps:
+            return own, own
         room = self.within if self.around is None else self.around * abs(own)
         assert room is not None
         return own - room, own + room
@@ -129,34 +136,60 @@ def own_value(model: Model, name: str) -> float:
 
 def grid_points(model: Model, axes: tuple[Axis, ...], first: int, count: int) -> dict[str, Array]:
     """Points of a grid by number; the last axis changes fastest."""
-    lines = [axis.grid(axis.own(model)) for axis in axes]
+    free = free_axes(axes)
+    lines = [axis.grid(axis.own(model)) for axis in free]
     places = np.unravel_index(np.arange(first, first + count), [len(line) for line in lines])
-    return {axis.name: line[place] for axis, line, place in zip(axes, lines, places, strict=True)}
+    points = {a.name: line[place] for a, line, place in zip(free, lines, places, strict=True)}
+    return _completed(model, axes, points)
 
 
 def sampled_points(
     model: Model, axes: tuple[Axis, ...], method: str, seed: tuple[int, ...], first: int, count: int
 ) -> dict[str, Array]:
     """Points of a sample by number; they do not depend on which others are asked for."""
+    free = free_axes(axes)
     sequence = np.random.SeedSequence(seed)
     if method == SOBOL:
         from scipy.stats import qmc
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of lengths that are no powers of two
-            engine = qmc.Sobol(len(axes), bits=SOBOL_BITS, rng=np.random.default_rng(sequence))
+            engine = qmc.Sobol(len(free), bits=SOBOL_BITS, rng=np.random.default_rng(sequence))
             shares = (engine.fast_forward(first) if first else engine).random(count)
     else:
         bits = np.random.PCG64(sequence)
-        bits.advance(first * len(axes))
-        shares = np.random.Generator(bits).random((count, len(axes)))
-    return {axis.name: axis.sample(axis.own(model), shares[:, i]) for i, axis in enumerate(axes)}
+        bits.advance(first * len(free))
+        shares = np.random.Generator(bits).random((count, len(free)))
+    points = {axis.name: axis.sample(axis.own(model), shares[:, i]) for i, axis in enumerate(free)}
+    return _completed(model, axes, points)
+
+
+def free_axes(axes: tuple[Axis, ...]) -> tuple[Axis, ...]:
+    """The axes that do not follow from others."""
+    return tuple(axis for axis in axes if not axis.keeps)
+
+
+def _completed(model: Model, axes: tuple[Axis, ...], points: dict[str, Array]) -> dict[str, Array]:
+    """Add what follows from other axes, and keep the order."""
+    made = {axis.name: _speeds(model, points) for axis in axes if axis.keeps}
+    return {axis.name: {**points, **made}[axis.name] for axis in axes}
+
+
+def _speeds(model: Model, points: dict[str, Array]) -> Array:
+    """Apex speeds at which starts have the energy of the model's own start."""
+    given = {name: column for name, column in points.items() if name in model.numbers}
+    own = start_energies(make_cases(model, {}))
+    at_rest, at_one = (start_energies(make_cases(model, {**given, "speed": v})) for v in (0.0, 1.0))
+    # The CoM is a state, so that its speed enters by its square alone.
+    squares = (own - at_rest) / (at_one - at_rest)
+    speeds: Array = np.copysign(np.sqrt(np.maximum(squares, 0.0)), model.apex["speed"])
+    return speeds
 
 
 def grid_size(axes: tuple[Axis, ...]) -> int:
     """How many points a grid has. Raises `ParameterError` for an axis without steps."""
     size = 1
-    for axis in axes:
+    for axis in free_axes(axes):
         if not axis.values and axis.steps is None:
             raise ParameterError(f"axis '{axis.name}' has no steps", "give steps = COUNT")
         size *= len(axis.values) or axis.steps or 1

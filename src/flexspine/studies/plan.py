@@ -27,6 +27,7 @@ from flexspine.studies.axes import (
     METHODS,
     OF_GAITS,
     Axis,
+    free_axes,
     grid_points,
     grid_size,
     sampled_points,
@@ -203,7 +204,7 @@ def _plan(content: Mapping[str, Any], place: Path) -> Plan:
 
 def _axes(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Axes by dotted name, whether it was quoted or written as nested tables."""
-    forms = {"low", "high", "around", "within", "steps"}
+    forms = {"low", "high", "around", "within", "steps", "keeps"}
     flat: dict[str, Any] = {}
     for name, content in table.items():
         if isinstance(content, Mapping) and not content.keys() <= forms:
@@ -253,8 +254,10 @@ def _check(plan: Plan) -> None:
         raise InputError(f"method '{plan.method}' needs samples", "give samples = COUNT")
     else:
         check_count("samples", plan.samples)
-    if not plan.axes:
+    if not free_axes(plan.axes):
         raise InputError("no axis varies", "add one under [axes]")
+    if plan.task != RUNS and any(axis.keeps for axis in plan.axes):
+        raise InputError("an axis that keeps the energy is for runs", "leave it out")
     _check_options(plan)
     for model in plan.models:
         _check_axes(plan, model)

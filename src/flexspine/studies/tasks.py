@@ -81,6 +81,8 @@ def _gaits(plan: Plan, chunk: int) -> pa.Table:
 
     rows = list(_followed(plan, chunk) if plan.task == GAITS else _searched(plan, chunk))
     names = ["point", *(column_of(axis.name) for axis in plan.axes), "outcome", "reason", "gait"]
+    if plan.task == GAITS:
+        names += ["branch_from", "branch_to"]
     schema = pa.schema([(name, _type(name)) for name in [*names, *_gait_columns()]])
     return pa.Table.from_pylist(rows, schema=schema)
 
@@ -169,7 +171,10 @@ def _followed(plan: Plan, chunk: int) -> Iterator[Row]:
         for row in rows:
             yield {**row, "outcome": NONE, "reason": str(failure)}
         return
+    reached = [point.value for point in branch.points]
+    reached += [mark.value for mark in branch.landmarks]
     for row, value in zip(rows, line, strict=True):
+        row |= {"branch_from": min(reached), "branch_to": max(reached)}
         there = branch.at(float(value))
         if not there:
             yield {**row, "outcome": NONE, "reason": "; ".join(branch.ends)}
