@@ -1,7 +1,7 @@
-"""Speed as ratios: `python -m benchmarks` prints one table and writes results/benchmarks.json.
+"""Speed as ratios: `python -m benchmarks` prints tables and writes results/benchmarks.json.
 
 Every ratio is the median over rounds in which both sides take turns, so a drifting machine
-weighs on both alike.
+weighs on both alike. `python -m benchmarks ensemble` does that section only, and keeps the rest.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import platform
 import statistics
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,34 +21,13 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import hand_field, scipy_peer
+from benchmarks.ensemble_benchmark import ensemble_benchmark, print_ensemble
 from benchmarks.gait_benchmark import gait_benchmark
+from benchmarks.timing import TOLERANCES, in_turn, median, ratio, seconds
 from flexspine import load_model
 from flexspine.hybrid.integrate import integrate
 
-ROUNDS = 7
-TOLERANCES = [m * 10.0**-e for e in range(8, 13) for m in (10, 5, 3, 2)]
-
-
-def seconds(work: Callable[[], object], repeats: int) -> float:
-    begin = time.perf_counter()
-    for _ in range(repeats):
-        work()
-    return (time.perf_counter() - begin) / repeats
-
-
-def in_turn(*jobs: tuple[Callable[[], object], int]) -> list[list[float]]:
-    """Time the jobs round by round; returns one row of seconds per round."""
-    for work, _ in jobs:
-        work()
-    return [[seconds(work, repeats) for work, repeats in jobs] for _ in range(ROUNDS)]
-
-
-def ratio(rows: list[list[float]], slow: int, fast: int) -> float:
-    return statistics.median(row[slow] / row[fast] for row in rows)
-
-
-def median(rows: list[list[float]], column: int) -> float:
-    return statistics.median(row[column] for row in rows)
+OUT = Path("results/benchmarks.json")
 
 
 def stride_benchmark() -> dict[str, object]:
@@ -187,9 +165,7 @@ def print_gaits(console: Console, gaits: dict[str, Any]) -> None:
         console.print(f"Search, {kind}, 100 starts: {search['gaits']} gaits in {search['s']:.2f} s")
 
 
-def main() -> None:
-    console = Console()
-    strides = stride_benchmark()
+def print_strides(console: Console, strides: dict[str, Any]) -> None:
     table = Table(title="One stride with events (k_t = 260 N m/rad, 4.5 m/s), core call")
     for heading in ("peer", "peer error", "peer ms", "flexspine error", "ms", "times faster"):
         table.add_column(heading, justify="left" if heading == "peer" else "right")
@@ -203,25 +179,44 @@ def main() -> None:
             f"{row['ratio']:.0f} ({row['ratio_at_default_tolerance']:.0f} at 1e-12)",
         )
     console.print(table)
-    field = field_benchmark()
+
+
+def print_field(console: Console, field: dict[str, Any]) -> None:
     console.print(
         f"Derived field: {field['derived_terms']} terms, {field['derived_us']:.1f} us; by hand "
         f"{field['hand_terms']} terms, {field['hand_us']:.1f} us; cost ratio "
         f"{field['cost_ratio']:.2f} (0.05 s of double stance, results differ by "
         f"{field['largest_difference']:.0e})"
     )
-    gaits = gait_benchmark()
-    print_gaits(console, gaits)
-    starts = start_benchmark()
+
+
+def print_starts(console: Console, starts: dict[str, Any]) -> None:
     for name, wall in starts.items():
         console.print(f"{name:<26}{wall:.2f} s")
-    out = Path("results/benchmarks.json")
-    out.parent.mkdir(exist_ok=True)
-    record = {"machine": platform.processor() or platform.machine(), "stride": strides}
-    out.write_text(
-        json.dumps({**record, "field": field, "gaits": gaits, "start": starts}, indent=2) + "\n"
-    )
-    console.print(f"written to {out}")
+
+
+def main() -> None:
+    console = Console()
+    sections: dict[str, tuple[Callable[[], dict[str, Any]], Callable[..., None]]] = {
+        "stride": (stride_benchmark, print_strides),
+        "field": (field_benchmark, print_field),
+        "gaits": (gait_benchmark, print_gaits),
+        "ensemble": (lambda: ensemble_benchmark(console), print_ensemble),
+        "start": (start_benchmark, print_starts),
+    }
+    wanted = sys.argv[1:] or list(sections)
+    unknown = [name for name in wanted if name not in sections]
+    if unknown:
+        sys.exit(f"no section {', '.join(unknown)}: there are {', '.join(sections)}")
+    OUT.parent.mkdir(exist_ok=True)
+    record = json.loads(OUT.read_text()) if OUT.exists() else {}
+    record["machine"] = platform.processor() or platform.machine()
+    for name in wanted:
+        measure, show = sections[name]
+        record[name] = measure()
+        show(console, record[name])
+    OUT.write_text(json.dumps(record, indent=2) + "\n")
+    console.print(f"written to {OUT}")
 
 
 if __name__ == "__main__":
