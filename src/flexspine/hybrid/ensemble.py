@@ -19,6 +19,7 @@ from flexspine.hybrid.integrate import (
     CLOSE,
     MAX_STEPS,
     SECTION_TIMEOUT,
+    SIMULTANEITY,
     integrate,
 )
 from flexspine.hybrid.lanes import LaneMode, LaneSystem
@@ -194,11 +195,9 @@ class _Pool:
         soon = self.soon[slots]
         first, others = _padded(slots[soon], mode), _padded(slots[~soon], mode)
         lanes, kept = np.concatenate([first, others]), len(first)
-        states, numbers, longest = (
-            self.states.take(lanes, axis=1),
-            self._numbers(lanes),
-            self.longest[lanes],
-        )
+        states, numbers = self.states.take(lanes, axis=1), self._numbers(lanes)
+        left = self.since[lanes] + SECTION_TIMEOUT - self.time[lanes]
+        longest = np.minimum(self.longest[lanes], np.maximum(left, 0.0))
         folded = self._folded(mode, lanes)
         end, lived, series = mode.flow(states, numbers, folded, longest, kept)
         found = mode.events.screen(states, end, lived, numbers)
@@ -248,9 +247,6 @@ class _Pool:
 
     def _happen(self, mode: LaneMode, slots: Indices, guards: Array) -> None:
         """Note what the events of a step lead to."""
-        late = self.time[slots] - self.since[slots] > SECTION_TIMEOUT
-        self._miss(slots[late])
-        slots, guards = slots[~late], guards[~late]
         quick = self.time[slots] - self.event_time[slots] < CHATTER_WINDOW
         self.crowded[slots] = np.where(quick, self.crowded[slots] + 1, 0)
         self.event_time[slots] = self.time[slots]
@@ -289,15 +285,10 @@ class _Pool:
     def _look_after(self) -> None:
         """End what stays away from the section, and look closer where events or steps crowd."""
         running = self.mode != NONE
-        late = running & (self.time - self.since > SECTION_TIMEOUT)
-        self._miss(np.flatnonzero(late))
+        late = running & (self.time - self.since > SECTION_TIMEOUT - SIMULTANEITY)
+        self._end(np.flatnonzero(late), self.system.section.missed)
         crowded = (self.crowded >= CHATTER_EVENTS) | (self.round - self.round_of > MAX_STEPS)
         self._alone(np.flatnonzero(running & ~late & crowded))
-
-    def _miss(self, slots: Indices) -> None:
-        """End runs that have not come back to the section in time."""
-        self.time[slots] = self.since[slots] + SECTION_TIMEOUT
-        self._end(slots, self.system.section.missed)
 
     def _alone(self, slots: Indices) -> None:
         """Do by itself, up to the next crossing, what is out of the ordinary."""
