@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexspine import load_model, rerun, simulate, sweep
+from flexspine import Plan, load_model, read_plan, rerun, simulate, sweep
 from flexspine.errors import InputError, ParameterError, UnknownNameError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.studies.basin import Basin, basin_plan, example_gaits, read_basins
@@ -115,11 +115,12 @@ def test_only_starts_with_its_energy_come_to_a_gait(gaits: dict[str, Gait], tmp_
 def test_the_basin_of_the_stable_gait_is_wide_and_no_other_gait_has_one(
     gaits: dict[str, Gait], tmp_path: Path
 ) -> None:
-    basins = found(tmp_path, gaits, SLICE, strides=100, points=14)
+    basins = found(tmp_path, gaits, SLICE, strides=100, points=10)
     assert [basin.name for basin in basins] == list(gaits)
     stable, *others = basins
     pitches, rates = stable.values
     inner = np.ix_(np.abs(pitches) < 0.2, np.abs(rates - radians(140)) < 3)
+    assert stable.settled[inner].size == 8
     assert stable.settled[inner].all()
     assert not any(basin.lasted.any() for basin in others)
     row = stable.row()
@@ -167,6 +168,39 @@ def test_what_is_no_gait_is_refused() -> None:
         basin_plan({"off": off})
     with pytest.raises(ParameterError, match="no gait"):
         basin_plan({})
+
+
+@pytest.mark.parametrize("method", ["random", "sobol"])
+def test_samples_of_a_file_keep_the_energy_too(tmp_path: Path, method: str) -> None:
+    file = tmp_path / "plan.toml"
+    file.write_text(
+        f'model = "scout2"\nmethod = "{method}"\nsamples = 8\n'
+        '[axes]\nheight = {within = 0.01}\nspeed = {keeps = "energy"}\n'
+    )
+    plan = read_plan(file)
+    assert Plan.revive(plan.record()).key == plan.key
+    points = plan.at(0)
+    assert list(points) == ["height", "speed"]
+    squares = 16 - 2 * 9.81 * (points["height"] - 0.35)
+    assert points["speed"] == pytest.approx(np.sqrt(squares), abs=1e-13)
+
+
+KEEPS = {
+    "another coordinate": ('height = {keeps = "energy"}', "'height'"),
+    "another quantity": ('speed = {keeps = "height"}', "'speed'"),
+    "nothing else": ('speed = {keeps = "energy"}', "no axis varies"),
+    "a search": ('height = [0.35]\nspeed = {keeps = "energy"}', "for runs"),
+}
+
+
+@pytest.mark.parametrize("case", KEEPS)
+def test_what_cannot_keep_the_energy_is_refused(tmp_path: Path, case: str) -> None:
+    axes, told = KEEPS[case]
+    task = "searches" if case == "a search" else "runs"
+    file = tmp_path / "plan.toml"
+    file.write_text(f'model = "scout2"\ntask = "{task}"\n[axes]\n{axes}\n')
+    with pytest.raises(InputError, match=told):
+        read_plan(file)
 
 
 def test_other_directories_are_refused(tmp_path: Path) -> None:

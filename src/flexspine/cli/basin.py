@@ -89,14 +89,14 @@ def basin(
     from flexspine.studies.basin import POINTS, STRIDES, basin_plan, read_basins
     from flexspine.studies.sweep import sweep as carry_out
 
+    ways, count = _slice(over), count_of(processes)
     plan = basin_plan(
         _gaits(preset, gait, set_),
-        _slice(over),
+        ways,
         points=POINTS if points is None else points,
         strides=STRIDES if strides is None else strides,
         keep_energy=keep_energy,
     )
-    count = count_of(processes)
     with unfinished_is_kept(out):
         with counting("starts") as progress:
             done = carry_out(plan, out, processes=count, client=scheduler, progress=progress)

@@ -59,15 +59,14 @@ def gait_map(
 
     if gait is not None and preset is not None:
         raise InputError("--preset and --gait are both given", "leave one of them")
+    ranges, count = (span("--stiffness", stiffness), span("--speeds", speeds)), count_of(processes)
     start = start_of(preset or DEFAULT_PRESET, gait, set_)
     plan = map_plan(
         start,
-        span("--stiffness", stiffness),
-        span("--speeds", speeds),
+        *ranges,
         lines=LINES if lines is None else lines,
         points=POINTS if points is None else points,
     )
-    count = count_of(processes)
     with unfinished_is_kept(out):
         with counting("gaits") as progress:
             done = carry_out(plan, out, processes=count, client=scheduler, progress=progress)
