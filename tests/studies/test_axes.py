@@ -194,6 +194,30 @@ def test_listed_values_are_drawn_evenly_and_no_others(method: str) -> None:
     assert np.max(np.abs(counts - 256)) <= (0 if method == "sobol" else 4 * (192**0.5))
 
 
+@pytest.mark.parametrize("method", ["grid", "random", "sobol"])
+def test_a_speed_that_keeps_the_energy_makes_up_for_what_varies(method: str) -> None:
+    """Of a rigid body: m v^2 / 2 + m g h + I w^2 / 2, and at rest where there is too much."""
+    steps = {"steps": 4} if method == "grid" else {}
+    axes = {
+        "speed": {"keeps": "energy"},
+        "height": {"low": 0.1, "high": 2.0, **steps},
+        "pitch_rate": {"within": 3, **steps},
+        "body.mass": [20.865, 30.0],
+    }
+    more = {} if method == "grid" else {"samples": 32}
+    found = points_of(plan_of(axes, SCOUT, method=method, chunk=5, **more))
+    assert list(found) == list(axes)
+    assert len(found["speed"]) == 32
+    own, inertia = preset_apex(SCOUT), 1.3
+    energy = 20.865 * (own["speed"] ** 2 / 2 + 9.81 * own["height"])
+    energy += inertia * own["pitch_rate"] ** 2 / 2
+    mass, rate = found["body.mass"], found["pitch_rate"]
+    left = energy - mass * 9.81 * found["height"] - inertia * rate**2 / 2
+    assert 0 < np.count_nonzero(left < 0) < 32
+    expected = np.sqrt(np.maximum(2 * left / mass, 0))
+    assert found["speed"] == pytest.approx(expected, rel=1e-13)
+
+
 @given(
     low=st.floats(-1e6, 1e6),
     width=st.floats(0, 1e6),

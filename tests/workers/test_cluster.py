@@ -81,7 +81,8 @@ class Machines:
     def scheduler(self, port: str = "0", **settings: str) -> str:
         file = self.directory / f"{len(self.started)}.json"
         self._start(["scheduler", "--port", port, "--scheduler-file", str(file)], settings)
-        until(file.exists)
+        # There before it is written to.
+        until(lambda: file.exists() and file.read_text().endswith("\n}"))
         return str(json.loads(file.read_text())["address"])
 
     def worker(self, address: str, threads: int = 1, **settings: str) -> subprocess.Popen[bytes]:
