@@ -174,11 +174,21 @@ class CompiledSystem:
 
         Held variables and then parameters are ``par[...]``, here and in `with_rates`.
         """
+        point, target = self._landed(mode, guard)
+        return list(point.values()), self._guards_and_rates(target, point)
+
+    def values_after(self, mode: Mode, guard: Guard, tracked: list[int]) -> list[Any]:
+        """Some of what the system tracks, by position, right after a jump."""
+        point, target = self._landed(mode, guard)
+        expressions = [target.observables[self.system.tracked[i]] for i in tracked]
+        return self._and_rates(target, expressions, point)[::2]
+
+    def _landed(self, mode: Mode, guard: Guard) -> tuple[dict[sp.Symbol, Any], Mode]:
+        """Where a jump leads: states and held variables there, and the mode."""
         lower = self._plain(mode.definitions)
         resets = {symbol: lower(value) for symbol, value in guard.resets.items()}
-        point = {**self._states, **self._held, **resets}
         target = self.system.mode(guard.target or mode.name)
-        return list(point.values()), self._guards_and_rates(target, point)
+        return {**self._states, **self._held, **resets}, target
 
     def with_rates(self, mode: Mode, expressions: list[sp.Expr]) -> tuple[list[Any], list[Any]]:
         """Expressions and their rates along a mode's field, in turn, and the states in them."""

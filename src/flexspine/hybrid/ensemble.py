@@ -7,19 +7,22 @@ ordinary is done by `integrate`, alone, up to the next crossing of the section.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
+import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
 from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.crowds import Crowds
 from flexspine.hybrid.integrate import (
-    CHATTER_EVENTS,
-    CHATTER_WINDOW,
     CLOSE,
     MAX_STEPS,
     SECTION_TIMEOUT,
     SIMULTANEITY,
+    Firing,
     integrate,
 )
 from flexspine.hybrid.lanes import LaneMode, LaneSystem
@@ -95,7 +98,19 @@ class Ends:
 
 def run_many(lanes: LaneSystem, starts: Starts, crossings: int, *, pool: int = POOL) -> Ends:
     """Run all until the section was crossed ``crossings`` times, or they end otherwise."""
-    return _Pool(lanes, starts, crossings, min(pool, len(starts))).run()
+    with _one_thread():
+        return _Pool(lanes, starts, crossings, min(pool, len(starts))).run()
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Keep heyoka from spreading calls over threads, which for calls this short wait for work."""
+    threads = hy.get_nthreads()
+    hy.set_nthreads(1)
+    try:
+        yield
+    finally:
+        hy.set_nthreads(threads)
 
 
 class _Pool:
@@ -114,8 +129,8 @@ class _Pool:
         self.shared = bool((starts.parameters == starts.parameters[:, :1]).all())
         self.mode, self.run_of = np.full(size, NONE), np.zeros(size, dtype=int)
         self.time, self.since, self.longest = (np.zeros(size) for _ in range(3))
-        self.crowded, self.round_of = (np.zeros(size, dtype=int) for _ in range(2))
-        self.event_time = np.zeros(size)
+        self.round_of = np.zeros(size, dtype=int)
+        self.crowds = Crowds(size)
         self.soon = np.zeros(size, dtype=bool)  # an event is to be expected in the next step
         self.requires = [(system.places[s], v) for s, v in system.section.requires.items()]
         self.resets = [(system.places[s], v) for s, v in system.section.resets.items()]
@@ -150,22 +165,24 @@ class _Pool:
         self.numbers[: self.n_held, slots] = starts.held[:, runs]
         self.numbers[self.n_held :, slots] = starts.parameters[:, runs]
         self.run_of[slots], self.mode[slots] = runs, self.names[starts.mode]
-        for kept in (self.time, self.since, self.crowded, self.event_time, self.soon):
+        for kept in (self.time, self.since, self.soon):
             kept[slots] = 0
         self.longest[slots], self.round_of[slots] = np.inf, self.round
+        self.crowds.forget(slots)
         for name, coefficients in self.coefficients.items():
             if self.shared:
                 break
             mode = self.lanes.mode(name)
             coefficients[slots] = mode.coefficients(starts.parameters.take(runs, axis=1))
-        self._alone(slots[self._close_to_guards(slots)])
+        mode = self.lanes.mode(starts.mode)
+        states, numbers = self.states.take(slots, axis=1), self.numbers.take(slots, axis=1)
+        self._raise(mode, slots, mode.events.first(states, numbers))
+        self._alone(slots[self._close_to_guards(mode, states, numbers)])
 
-    def _close_to_guards(self, slots: Indices) -> Flags:
+    def _close_to_guards(self, mode: LaneMode, states: Array, numbers: Array) -> Flags:
         """Where a start is so close to a guard that what is due there has to be looked at."""
-        mode = self.lanes.mode(self.starts.mode)
-        numbers = self.numbers[: mode.code.n_inputs].take(slots, axis=1)
-        values = mode.code.kernel(self.states.take(slots, axis=1), pars=numbers)
-        close = np.zeros(len(slots), dtype=bool)
+        values = mode.code.kernel(states, pars=numbers[: mode.code.n_inputs])
+        close = np.zeros(len(states.T), dtype=bool)
         for jump in mode.code.jumps:
             if jump.acts:
                 value = values[jump.value]
@@ -195,34 +212,38 @@ class _Pool:
         soon = self.soon[slots]
         first, others = _padded(slots[soon], mode), _padded(slots[~soon], mode)
         lanes, kept = np.concatenate([first, others]), len(first)
-        states, numbers = self.states.take(lanes, axis=1), self._numbers(lanes)
+        n = len(self.states)
+        steps, numbers = np.empty((2 * n + 1, len(lanes))), self._numbers(lanes)
+        self.states.take(lanes, axis=1, out=steps[:n], mode="clip")
         left = self.since[lanes] + SECTION_TIMEOUT - self.time[lanes]
         longest = np.minimum(self.longest[lanes], np.maximum(left, 0.0))
         folded = self._folded(mode, lanes)
-        end, lived, series = mode.flow(states, numbers, folded, longest, kept)
-        found = mode.events.screen(states, end, lived, numbers)
-        doubtful, happens = found.doubt != 0, (found.guard != NOTHING) | (found.top != 0)
+        series = mode.flow(steps, numbers, folded, longest, kept)
+        found = mode.events.screen(steps, numbers)
+        lived = steps[-1]
+        lost, doubtful = found.lost != 0, found.doubt != 0
+        happens = (found.guard != NOTHING) | (found.top != 0)
         self.soon[lanes], self.longest[lanes] = found.soon != 0, np.inf
         # Lanes that only fill up repeat another one, whose slot is written twice with the same.
-        plain = np.flatnonzero(~(happens | doubtful))
-        self.states[:, lanes[plain]] = end.take(plain, axis=1)
+        plain = np.flatnonzero(~(happens | doubtful | lost))
+        self.states[:, lanes[plain]] = steps[n : 2 * n].take(plain, axis=1)
         self.time[lanes[plain]] += lived[plain]
 
         doubted = np.flatnonzero(doubtful)
         self.longest[lanes[doubted]] = lived[doubted] / 2
-        odd = [lanes[doubted[lived[doubted] < 2 * SHORTEST]]]
-        known, unforeseen = np.arange(kept), kept + np.flatnonzero(happens[kept:])
+        odd = [lanes[lost], lanes[doubted[lived[doubted] < 2 * SHORTEST]]]
+        known, unforeseen = np.arange(kept), kept + np.flatnonzero(happens[kept:] & ~lost[kept:])
         for few in (known, _padded(unforeseen, mode)):
             if not len(few):
                 continue
             given, guard, whole = numbers.take(few, axis=1), found.guard[few], lived[few]
             if few is not known:
-                begin, own = states.take(few, axis=1), self._folded(mode, lanes[few])
-                _, _, series = mode.flow(begin, given, own, whole, len(few))
+                own = self._folded(mode, lanes[few])
+                series = mode.flow(steps.take(few, axis=1), given, own, whole, len(few))
             series[-2] = np.where(guard == NOTHING, whole, found.share[few] * whole)
             series[-1] = guard
             seen = mode.events.look(series, given)
-            looked = happens[few] & ~doubtful[few]
+            looked = happens[few] & ~(doubtful | lost)[few]
             odd.append(lanes[few[looked & (seen.odd != 0)]])
             clear = np.flatnonzero(looked & (seen.odd == 0))
             self._land(mode, lanes[few[clear]], guard[clear], seen.take(clear))
@@ -247,9 +268,7 @@ class _Pool:
 
     def _happen(self, mode: LaneMode, slots: Indices, guards: Array) -> None:
         """Note what the events of a step lead to."""
-        quick = self.time[slots] - self.event_time[slots] < CHATTER_WINDOW
-        self.crowded[slots] = np.where(quick, self.crowded[slots] + 1, 0)
-        self.event_time[slots] = self.time[slots]
+        crowded = self.crowds.note(mode.code, slots, guards, self.time[slots])
         for row, jump in enumerate(mode.code.jumps):
             here = slots[guards == row]
             if not len(here):
@@ -259,6 +278,8 @@ class _Pool:
                 self._cross(here)
             if jump.guard.ends is not None:
                 self._end(here, jump.guard.ends)
+        if crowded.any():
+            self._alone(slots[crowded & (self.mode[slots] != NONE)])
 
     def _cross(self, slots: Indices) -> None:
         """Count a crossing of the section."""
@@ -283,12 +304,12 @@ class _Pool:
         self.mode[slots] = NONE
 
     def _look_after(self) -> None:
-        """End what stays away from the section, and look closer where events or steps crowd."""
+        """End what stays away from the section, and look closer at what gets nowhere."""
         running = self.mode != NONE
         late = running & (self.time - self.since > SECTION_TIMEOUT - SIMULTANEITY)
         self._end(np.flatnonzero(late), self.system.section.missed)
-        crowded = (self.crowded >= CHATTER_EVENTS) | (self.round - self.round_of > MAX_STEPS)
-        self._alone(np.flatnonzero(running & ~late & crowded))
+        slow = self.round - self.round_of > MAX_STEPS
+        self._alone(np.flatnonzero(running & ~late & slow))
 
     def _alone(self, slots: Indices) -> None:
         """Do by itself, up to the next crossing, what is out of the ordinary."""
@@ -303,7 +324,15 @@ class _Pool:
                 self.numbers[: self.n_held, slot].copy(),
             )
             left = SECTION_TIMEOUT - (start.time - float(self.since[slot]))
-            done = integrate(bound, start, crossings=1, section_timeout=left, record=True)
+            done = integrate(
+                bound,
+                start,
+                crossings=1,
+                section_timeout=left,
+                record=True,
+                before=self.crowds.of(slot),
+            )
+            self.crowds.go_on(slot, [Firing(event.time, event.names) for event in done.events])
             one = np.array([slot])
             for arc in done.arcs:
                 mode = self.lanes.mode(arc.mode)
@@ -311,7 +340,7 @@ class _Pool:
             self.time[slot], self.states[:, slot] = done.end.time, done.end.states
             self.numbers[: self.n_held, slot] = done.end.held
             self.mode[slot], self.longest[slot] = self.names[done.end.mode], np.inf
-            self.soon[slot], self.crowded[slot] = False, 0
+            self.soon[slot] = False
             if done.outcome.completed:
                 self._cross(one)
             else:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
 import numpy as np
@@ -38,12 +39,20 @@ GRAZING_RATE = 1e-4
 # One guard firing this often within this many seconds is chatter; no gait comes near it.
 CHATTER_EVENTS = 8
 CHATTER_WINDOW = 1e-2
+RECENT_EVENTS = 4 * CHATTER_EVENTS
 
 # s; the slowest strides take one or two.
 SECTION_TIMEOUT = 10.0
 
 # A stride takes some 30 steps; spending this many between two crossings is getting nowhere.
 MAX_STEPS = 50_000
+
+
+class Firing(NamedTuple):
+    """When, in s, which guards fired at one instant."""
+
+    time: float
+    names: tuple[str, ...]
 
 
 def integrate(
@@ -56,18 +65,19 @@ def integrate(
     section_timeout: float = SECTION_TIMEOUT,
     max_steps: int = MAX_STEPS,
     record: bool = False,
+    before: Sequence[Firing] = (),
 ) -> Trajectory:
     """Run until ``end_time`` (s) or until the section was crossed ``crossings`` times.
 
     ``section`` is the system's own if none is given. With ``crossings``, a run that stays away
     from it for ``section_timeout`` seconds ends as its ``missed`` outcome. ``max_steps``
     bounds the Taylor steps between two crossings. ``record`` keeps dense output, and only then is
-    a guard noticed that touches zero without crossing it. Always returns; the outcome tells how it
-    ended.
+    a guard noticed that touches zero without crossing it. ``before`` are firings that led to
+    ``start``, which count for chatter. Always returns; the outcome tells how it ended.
     """
     watched = section or bound.system.section
-    run = _Run(bound, start, end_time, crossings, watched, section_timeout, max_steps, record)
-    return run.go()
+    limits = end_time, crossings, watched, section_timeout, max_steps
+    return _Run(bound, start, *limits, record, before).go()
 
 
 class _Run:
@@ -83,6 +93,7 @@ class _Run:
         section_timeout: float,
         max_steps: int,
         record: bool,
+        before: Sequence[Firing],
     ) -> None:
         self.bound, self.start, self.record = bound, start, record
         self.end_time, self.wanted = end_time, wanted
@@ -93,6 +104,7 @@ class _Run:
         self.time, self.mode = start.time, start.mode
         self.states, self.held = start.states, start.held
         self.events: list[Event] = []
+        self.firings = [*before]
         self.crossings: list[HybridState] = []
         self.arcs: list[Arc] = []
         self.steps, self.steps_left = 0, max_steps
@@ -220,7 +232,7 @@ class _Run:
             self._fire(jump, values)
         if crossed:
             self._cross()
-        self.events.append(Event(tuple(self.fired), before, self._here()))
+        self._note(tuple(self.fired), before)
         return True
 
     def _may_cross(self) -> bool:
@@ -297,21 +309,24 @@ class _Run:
             known = len(self.fired)
             self.fired.append(jump.guard.name)
             self._fire(jump, values)
-            self.events.append(Event(tuple(self.fired[known:]), before, self._here()))
+            self._note(tuple(self.fired[known:]), before)
+
+    def _note(self, names: tuple[str, ...], before: str) -> None:
+        """Note an event."""
+        self.events.append(Event(names, before, self._here()))
+        self.firings.append(Firing(self.time, names))
 
     def _doubt(self, name: str, rate: float) -> OutcomeKind | None:
         """Tell a grazing or a chattering event from a proper one."""
         grazing = -GRAZING_RATE < rate < GRAZING_RATE
-        crowded = len(self.events) >= CHATTER_EVENTS and (
-            self.time - self.events[-CHATTER_EVENTS].after.time < CHATTER_WINDOW
+        crowded = len(self.firings) >= CHATTER_EVENTS and (
+            self.time - self.firings[-CHATTER_EVENTS].time < CHATTER_WINDOW
         )
         if not (grazing or crowded):
             return None
-        recent = [
-            e for e in self.events[-4 * CHATTER_EVENTS :] if self.time - e.time < CHATTER_WINDOW
-        ]
-        before = sum(name in event.names for event in recent)
-        if before >= (CHATTER_EVENTS // 2 if grazing else CHATTER_EVENTS):
+        recent = self.firings[-RECENT_EVENTS:]
+        times = sum(name in f.names for f in recent if self.time - f.time < CHATTER_WINDOW)
+        if times >= (CHATTER_EVENTS // 2 if grazing else CHATTER_EVENTS):
             return CHATTERED
         return GRAZED if grazing else None
 

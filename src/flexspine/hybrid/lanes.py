@@ -21,10 +21,10 @@ from flexspine.hybrid.step_events import StepEvents
 from flexspine.hybrid.system import Mode
 
 # Bytes; the Taylor coefficients of all terms of all lanes of an integrator stay in fast memory.
-COEFFICIENTS = 160_000
+COEFFICIENTS = 320_000
 
 # SIMD registers side by side: so many that a call from Python costs little a lane.
-REGISTERS = (2, 12)
+REGISTERS = (2, 8)
 
 
 # s; where neither field nor guards set an end to a step.
@@ -69,32 +69,35 @@ class LaneMode:
         count = parameters.shape[1]
         # Whole registers only: what is left over would be computed by other instructions.
         filled = np.arange(count + -count % self.width).clip(max=count - 1)
+        if not len(parameters):
+            return np.zeros((count, self.n_coefficients))
         result: Array = self._coefficients(parameters.take(filled, axis=1))
         return result[: self.n_coefficients, :count].T.copy()
 
     def flow(
-        self, states: Array, held: Array, folded: Array, longest: Array, kept: int = 0
-    ) -> tuple[Array, Array, Array]:
+        self, steps: Array, held: Array, folded: Array, longest: Array, kept: int = 0
+    ) -> Array:
         """Take one step of every lane; their number has to be a multiple of ``width``.
 
-        ``held`` (m, k) or more rows, ``folded`` from `coefficients`, or one row of them for all;
-        ``longest`` (k,) bounds the steps, in s, as LONGEST does. Returns states (n, k), lengths
-        (k,) in s and the Taylor series of the first ``kept`` lanes, shape (n (order + 1) + 2,
-        kept), of which the last two rows are free.
+        ``steps`` (2 n + 1, k) hold the states where they begin; the states where they end and their
+        lengths in s are filled in, below. ``held`` (m, k) or more rows, ``folded`` from
+        `coefficients`, or one row of them for all; ``longest`` (k,) bounds the steps, in s, as
+        LONGEST does. Returns the Taylor series of the first ``kept`` lanes, shape
+        (n (order + 1) + 2, kept), of which the last two rows are free.
         """
-        integrator, width, n = self._integrator, self.width, len(states)
+        integrator, width, n = self._integrator, self.width, len(steps) // 2
         state, length = integrator.state[:n], integrator.last_h
         taylor = integrator.tc[:n].reshape(-1, width)
-        blocks, numbers = _blocks(states, width), self._numbers(held, folded)
+        blocks, numbers = _blocks(steps[:n], width), self._numbers(held, folded)
         given = integrator.pars[: numbers.shape[1]]
         lengths, series = np.empty((len(blocks), width)), np.empty((len(taylor) + 2, kept))
         bounds = np.minimum(longest, LONGEST).reshape(-1, width)
         bounded = np.logical_or((bounds < LONGEST).any(axis=1), self._limited)
         limits = bounds.tolist() if bounded.any() else []
-        steps = zip(blocks, numbers, lengths, bounded.tolist(), strict=True)
-        for i, (here, own, lived, limit) in enumerate(steps):
-            state[:] = here
-            given[:] = own
+        each = zip(blocks, numbers, lengths, bounded.tolist(), strict=True)
+        for i, (here, own, lived, limit) in enumerate(each):
+            state[...] = here
+            given[...] = own
             keep = i * width < kept
             if limit:
                 integrator.step(limits[i], write_tc=keep)
@@ -102,16 +105,18 @@ class LaneMode:
                 integrator.step(write_tc=True)
             else:
                 integrator.step()
-            here[:] = state
-            lived[:] = length
+            here[...] = state
+            lived[...] = length
             if keep:
                 series[:-2, i * width : (i + 1) * width] = taylor
         # Flows are autonomous, and a time that is not finite would stick.
         integrator.set_time(0.0)
         if not self._limited and not (lengths <= LONGEST).all():
             self._limited = True
-            return self.flow(states, held, folded, longest, kept)
-        return blocks.transpose(1, 0, 2).reshape(states.shape), lengths.reshape(-1), series
+            return self.flow(steps, held, folded, longest, kept)
+        steps[n : 2 * n].reshape(n, -1, width)[...] = blocks.transpose(1, 0, 2)
+        steps[-1] = lengths.reshape(-1)
+        return series
 
     def _numbers(self, held: Array, folded: Array) -> Array:
         """What changes of the integrator's parameters from block to block: the first of them."""
@@ -144,8 +149,8 @@ def _width(integrator: Any) -> int:
 
 def _blocks(columns: Array, width: int) -> Array:
     """Columns in blocks, shape (blocks, rows, width)."""
-    rows, _ = columns.shape
-    return columns.reshape(rows, -1, width).transpose(1, 0, 2).copy()
+    rows, count = columns.shape
+    return columns.reshape(rows, count // width, width).transpose(1, 0, 2).copy()
 
 
 class LaneSystem:

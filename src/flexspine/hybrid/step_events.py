@@ -7,6 +7,7 @@ All of it is compiled, without branches, so that lanes stay together.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import heyoka as hy
@@ -20,7 +21,9 @@ from flexspine.hybrid.compile import (
     Jump,
     compile_expressions,
 )
+from flexspine.hybrid.grazing import GRAZING_DEPTH
 from flexspine.hybrid.integrate import GRAZING_RATE, SIMULTANEITY, ZERO
+from flexspine.hybrid.system import Guard, Mode
 
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
@@ -45,13 +48,15 @@ NEVER = 2.0
 class Screening(NamedTuple):
     """What there may be in a step of each of k lanes.
 
-    ``guard`` (k,) fires first, at about ``share`` of the step, or is NOTHING. ``doubt`` is not 0
-    where a guard turns and may have crossed zero twice, nor ``top`` where something tracked is
-    largest within the step, nor ``soon`` where either seems to be ahead in the next step.
+    ``guard`` (k,) fires first, at about ``share`` of the step, or is NOTHING. ``lost`` is not 0
+    where the step left all numbers, nor ``doubt`` where a guard turns and may have touched zero,
+    nor ``top`` where something tracked is largest within the step, nor ``soon`` where either seems
+    to be ahead in the next step.
     """
 
     guard: Array
     share: Array
+    lost: Array
     doubt: Array
     top: Array
     soon: Array
@@ -80,14 +85,17 @@ class StepEvents:
     """What happens within steps in one mode.
 
     ``numbers`` are the held variables and then the parameters, shape (m + p, k). ``tracked`` are
-    the positions, among all that the system tracks, of what is not always zero in this mode.
+    the positions, among all that the system tracks, of what is not always zero in this mode or
+    when it is left.
     """
 
     def __init__(self, compiled: CompiledSystem, code: CompiledMode, order: int) -> None:
         system, mode = compiled.system, code.mode
         self.code, self._n, self._m = code, len(system.states), len(system.held)
         observed = [mode.observables[what] for what in system.tracked]
-        self.tracked = [i for i, expression in enumerate(observed) if expression != 0]
+        self._changed = [_changed(compiled, mode, guard) for guard in mode.guards]
+        lasting = {i for i, expression in enumerate(observed) if expression != 0}
+        self.tracked = sorted(lasting.union(*self._changed))
         expressions = [guard.expression for guard in mode.guards]
         expressions += [observed[i] for i in self.tracked]
         values, self._states = compiled.with_rates(mode, expressions)
@@ -103,9 +111,8 @@ class StepEvents:
         self._screen = self._compile_screen()
         self._look = self._compile_look(compiled, order)
 
-    def screen(self, begin: Array, end: Array, length: Array, numbers: Array) -> Screening:
-        """Look for what happens in steps between states of shape (n, k)."""
-        steps = np.concatenate([begin, end, length[None]])
+    def screen(self, steps: Array, numbers: Array) -> Screening:
+        """Look for what happens in ``steps`` (2 n + 1, k): states at both ends, lengths in s."""
         return Screening(*self._screen(steps, pars=numbers[: self._screen.nparams]))
 
     def look(self, series: Array, numbers: Array) -> Outlook:
@@ -127,24 +134,28 @@ class StepEvents:
         end = [hy.expression(f"e{i}") for i in range(len(self._states))]
         length = hy.expression("length")
         later = self._at(self._guards, end)
-        first, least = hy.expression(NOTHING), hy.expression(NEVER)
+        which, falling = hy.expression(0.0), hy.expression(0.0)
+        values = [hy.expression(0.0)] * 4
         doubt, top, soon = (hy.expression(0.0) for _ in range(3))
         for row, requires in self._wanted.items():
             g0, r0 = self._guards[2 * row : 2 * row + 2]
             g1, r1 = later[2 * row : 2 * row + 2]
-            armed, above = _armed(g0, r0, requires), hy.gt(g1, 0.0)
+            armed, above = _armed(g0, r0, requires), hy.gt(g1, _margin(r1, 0.0))
             falls = hy.logical_and([armed, _not(above)])
-            share = _cubic_root(g0, r0 * length, g1, r1 * length)
-            share = hy.select(falls, share, hy.expression(NEVER))
-            sooner = hy.lt(share, least)
-            first = hy.select(sooner, hy.expression(float(row)), first)
-            least = hy.select(sooner, share, least)
+            falling += falls
+            which = hy.select(falls, hy.expression(float(row)), which)
+            own = (g0, r0 * length, g1, r1 * length)
+            values = [hy.select(falls, v, w) for v, w in zip(own, values, strict=True)]
             ahead = g1 + r1 * length + (r1 - r0) * length / 2.0
             soon += hy.logical_and([above, hy.lt(ahead, 0.0), *_held(requires)])
             # A guard that turns once is bounded by its tangents at both ends.
             left, right = g0 + r0 * length, g1 - r1 * length
-            dips = [armed, above, hy.lt(r0, 0.0), hy.gt(r1, 0.0)]
-            doubt += hy.logical_and([*dips, hy.lte(left, 0.0), hy.lte(right, 0.0)])
+            depth = GRAZING_DEPTH if self.code.jumps[row].guard.jumps else 0.0
+            dips = [armed, above, hy.lt(r0, 0.0)]
+            turned = [hy.gt(r1, 0.0), hy.lte(left, depth), hy.lte(right, depth)]
+            doubt += hy.logical_and([*dips, *turned])
+            # A step ends before it comes so close, so that the next one sees it turn.
+            doubt += hy.logical_and([*dips, hy.lte(r1, 0.0), hy.lte(g1, depth)])
             if not requires:
                 humps = [_not(armed), _not(above), hy.gt(r0, 0.0), hy.lt(r1, 0.0)]
                 doubt += hy.logical_and([*humps, hy.gte(left, 0.0), hy.gte(right, 0.0)])
@@ -152,7 +163,13 @@ class StepEvents:
         for before, after in zip(rates, self._at(rates, end), strict=True):
             top += hy.logical_and([hy.gt(before, 0.0), hy.lt(after, 0.0)])
             soon += hy.logical_and([hy.gt(after, 0.0), hy.lt(2.0 * after - before, 0.0)])
-        return compile_expressions([first, least, doubt, top, soon], [*self._states, *end, length])
+        guard = hy.select(hy.gt(falling, 0.0), which, hy.expression(NOTHING))
+        # Which of several falls first is seen in shorter steps.
+        doubt += hy.gt(falling, 1.0)
+        size = hy.sum([state**2.0 for state in end]) + length
+        lost = _not(hy.lt(size, np.inf))
+        answer = [guard, _cubic_root(*values), lost, doubt, top, soon]
+        return compile_expressions(answer, [*self._states, *end, length])
 
     def _compile_look(self, compiled: CompiledSystem, order: int) -> Any:
         n = len(self._states)
@@ -167,7 +184,7 @@ class StepEvents:
         begin, now = [row[0] for row in series], self._at(self._guards, states)
         odd = self._odd(which, time, change, self._at(self._guards, begin), now)
         after, further = self._jumped(compiled, which, states)
-        tops = self._tops(series, begin, time)
+        tops = self._entering(compiled, which, states, self._tops(series, begin, time))
         return compile_expressions(
             [time, *after, odd + further, *tops],
             [*(c for row in series for c in row), given, which],
@@ -217,6 +234,9 @@ class StepEvents:
         results = []
         for i in range(0, len(first), 2):
             (f0, r0), (f1, r1) = first[i : i + 2], last[i : i + 2]
+            if f0 == hy.expression(0.0):
+                results.append(f0)
+                continue
             rise, start, stop = f1 - f0, r0 * length, r1 * length
             middle = 6.0 * rise - 4.0 * start - 2.0 * stop
             bend = 3.0 * (start + stop) - 6.0 * rise
@@ -233,6 +253,36 @@ class StepEvents:
             inside = hy.logical_and([hy.gt(r0, 0.0), hy.lt(r1, 0.0), hy.gt(highest, larger)])
             results.append(hy.select(inside, highest, larger))
         return results
+
+    def _entering(
+        self, compiled: CompiledSystem, which: Any, states: list[Any], tops: list[Any]
+    ) -> list[Any]:
+        """The largest values, with those at the beginning of the next mode, where they may jump."""
+        largest = dict(zip(self.tracked, tops, strict=True))
+        mode = self.code.mode
+        for row, (guard, changed) in enumerate(zip(mode.guards, self._changed, strict=True)):
+            here = hy.eq(which, float(row))
+            values = self._at(compiled.values_after(mode, guard, changed), states)
+            for i, value in zip(changed, values, strict=True):
+                largest[i] = hy.select(here, _larger(largest[i], value), largest[i])
+        return list(largest.values())
+
+    @cached_property
+    def _first(self) -> Any:
+        return compile_expressions(self._tracked[::2], self._states)
+
+    def first(self, states: Array, numbers: Array) -> Array:
+        """What is tracked, shape (t, k), at states in this mode."""
+        result: Array = self._first(states, pars=numbers[: self._first.nparams])
+        return result[: len(self.tracked)]
+
+
+def _changed(compiled: CompiledSystem, mode: Mode, guard: Guard) -> list[int]:
+    """The positions of what is tracked that is another function after a guard has fired."""
+    system = compiled.system
+    after = system.mode(guard.target or mode.name).observables
+    pairs = [(mode.observables[what], after[what]) for what in system.tracked]
+    return [i for i, (was, now) in enumerate(pairs) if now not in (was, 0)]
 
 
 def _due(pairs: list[Any], jump: Jump) -> Any:
