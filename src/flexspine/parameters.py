@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -127,13 +128,18 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Turn ``{"a": {"b": 1}}`` into ``{"a.b": 1}``."""
+    """Turn ``{"a": {"b": 1}}`` into ``{"a.b": 1}``.
+
+    Raises `ParameterError` for what is given both ways.
+    """
     flat: dict[str, Any] = {}
     for name, value in tree.items():
-        if isinstance(value, Mapping):
-            flat |= flattened(value, f"{prefix}{name}.")
-        else:
-            flat[f"{prefix}{name}"] = value
+        dotted = f"{prefix}{name}"
+        inner = flattened(value, f"{dotted}.") if isinstance(value, Mapping) else {dotted: value}
+        twice = flat.keys() & inner.keys()
+        if twice:
+            raise ParameterError(f"'{min(twice)}' is given twice", "keep one of them")
+        flat |= inner
     return flat
 
 
@@ -142,9 +148,20 @@ def is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
+def is_finite(value: Any) -> bool:
+    """Whether a value is a real number, neither infinite nor beyond what a float holds."""
+    try:
+        return is_number(value) and isfinite(value)
+    except OverflowError:
+        return False
+
+
 def shortened(value: Any, most: int = 40) -> str:
     """Return a value as an error message shows it: texts in quotes, nothing too long."""
-    shown = f"'{value}'" if isinstance(value, str) else str(value)
+    try:
+        shown = f"'{value}'" if isinstance(value, str) else str(value)
+    except ValueError:  # Python writes no whole number of thousands of digits
+        shown = "a number of too many digits"
     return shown if len(shown) <= most else f"{shown[:most]}..."
 
 

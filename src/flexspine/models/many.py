@@ -32,17 +32,20 @@ class Cases:
     """A model and what differs from run to run: values by name, each of shape (k,).
 
     Names are those of `Model.numbers`: apex coordinates, ``touchdown.fore``, ``spine.stiffness``.
+    ``body`` is the model whose system serves all of them: no term of it is missing in any case.
     """
 
     model: Model
     varied: Mapping[str, Array]
+    body: Model
 
     def __len__(self) -> int:
         return len(next(iter(self.varied.values())))
 
     def piece(self, part: slice) -> Cases:
         """Some of the cases."""
-        return Cases(self.model, {name: column[part] for name, column in self.varied.items()})
+        varied = {name: column[part] for name, column in self.varied.items()}
+        return Cases(self.model, varied, self.body)
 
     def one(self, index: int) -> Model:
         """The model of one case."""
@@ -159,8 +162,11 @@ def _in_order(
                 following += 1
 
 
-def make_cases(model: Model, given: Mapping[str, ArrayLike]) -> Cases:
-    """Check what varies, and make all of it equally long. Raises as `simulate_many`."""
+def make_cases(model: Model, given: Mapping[str, ArrayLike], body: Model | None = None) -> Cases:
+    """Check what varies, and make all of it equally long. Raises as `simulate_many`.
+
+    ``body`` is given where there are other cases that have to share a system with these.
+    """
     known = {*model.apex, *model.parameter_names}
     bounds = _bounds(model)
     varied: dict[str, Array] = {}
@@ -191,7 +197,15 @@ def make_cases(model: Model, given: Mapping[str, ArrayLike]) -> Cases:
                 f"'{name}' has {len(column)} values where others have {longest}",
                 "give as many of each, or a single number",
             )
-    return Cases(model, {n: np.broadcast_to(c, (longest,)) for n, c in varied.items()})
+    varied = {name: np.broadcast_to(column, (longest,)) for name, column in varied.items()}
+    return Cases(model, varied, body or _with_largest(model, varied))
+
+
+def _with_largest(model: Model, varied: Mapping[str, Array]) -> Model:
+    """A model with every parameter as large as it gets; terms that vanish leave the system."""
+    known = values(model.parameters)
+    largest = {name: float(column.max()) for name, column in varied.items() if name in known}
+    return model.with_values(largest) if largest else model
 
 
 def _bounds(model: Model) -> dict[str, tuple[float, float, str]]:
@@ -228,14 +242,7 @@ def run_cases(cases: Cases, strides: int, tolerance: float) -> Columns:
 
 def _starts(cases: Cases) -> tuple[Model, Starts]:
     """The model whose system serves all cases, and where they start."""
-    # Terms that vanish are left out of a system; these do not vanish in all cases.
-    largest = {
-        name: float(column.max())
-        for name, column in cases.varied.items()
-        if name in values(cases.model.parameters)
-    }
-    model = cases.model.with_values(largest) if largest else cases.model
-    count, start = len(cases), cases.model.apex_state()
+    model, count, start = cases.body, len(cases), cases.model.apex_state()
     states = np.repeat(start.states[:, None], count, axis=1)
     parameters = np.repeat(cases.model.parameter_vector[:, None], count, axis=1)
     coordinates, names = model.system.section.coordinates, model.parameter_names

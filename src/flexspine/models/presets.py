@@ -62,9 +62,9 @@ def _read(preset: str) -> str:
         resource = files("flexspine") / "presets" / f"{preset}.toml"
         return resource.read_text(encoding="utf-8")
     path = Path(preset)
-    if path.suffix != ".toml" and not path.exists():
-        raise UnknownNameError("preset", preset, preset_names())
     try:
+        if path.suffix != ".toml" and not path.exists():
+            raise UnknownNameError("preset", preset, preset_names())
         return path.read_text(encoding="utf-8-sig")
     except OSError as failure:
         raise PresetError(
@@ -72,12 +72,14 @@ def _read(preset: str) -> str:
         ) from None
     except UnicodeDecodeError:
         raise PresetError(f"'{preset}' is not text", "give a TOML file in UTF-8") from None
+    except ValueError:
+        raise PresetError(f"{preset!r} is no file name", "give a readable TOML file") from None
 
 
 def _parse(name: str, text: str) -> dict[str, Any]:
     try:
         content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as failure:
+    except (ValueError, RecursionError) as failure:
         raise PresetError(f"'{name}' is not valid TOML: {failure}", "mend that line") from None
     for key, value in content.items():
         if key not in _TABLES | _TEXTS | _LISTS:

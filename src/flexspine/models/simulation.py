@@ -19,6 +19,9 @@ from flexspine.parameters import is_number, shortened
 # Taylor truncation error per step; strides then repeat to some 1e-13.
 DEFAULT_TOLERANCE = 1e-12
 
+# What can be counted; larger ones do not fit everywhere.
+MOST = 2**53
+
 
 @dataclass(frozen=True)
 class Run:
@@ -100,10 +103,12 @@ def simulate(
 def check_count(name: str, value: int) -> int:
     """Return a whole number from 1 on. Raises `ParameterError` for anything else."""
     if not (is_number(value) and isinstance(value, Integral) and value >= 1):
-        raise ParameterError(
-            f"{name} = {shortened(value)} is not usable", "give a whole number from 1 on"
-        )
-    return int(value)
+        remedy = "give a whole number from 1 on"
+    elif value > MOST:
+        remedy = f"give no more than {MOST}"
+    else:
+        return int(value)
+    raise ParameterError(f"{name} = {shortened(value)} is not usable", remedy)
 
 
 def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:

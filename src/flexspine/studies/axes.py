@@ -15,7 +15,7 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.many import make_cases, start_energies
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
-from flexspine.parameters import is_number
+from flexspine.parameters import is_finite, shortened
 
 # What is known of a gait only.
 OF_GAITS = ("energy", "mean_speed")
@@ -23,8 +23,9 @@ OF_GAITS = ("energy", "mean_speed")
 GRID, RANDOM, SOBOL = "grid", "random", "sobol"
 METHODS = (GRID, RANDOM, SOBOL)
 
-# Binary digits of a Sobol sequence: 4 thousand million points.
+# Points a model, 4 thousand million; a Sobol sequence of so many binary digits has no more.
 SOBOL_BITS = 32
+MOST_POINTS = 2**SOBOL_BITS
 
 FORMS = (
     "write a list of values, {low = ..., high = ...}, {around = SHARE} or {within = AMOUNT}, "
@@ -54,7 +55,7 @@ class Axis:
     def read(cls, name: str, content: Any) -> Axis:
         """Make an axis of what a file says of it. Raises `InputError`."""
         if isinstance(content, (list, tuple)):
-            if not content or not all(map(is_number, content)):
+            if not content or not all(map(is_finite, content)):
                 raise InputError(f"axis '{name}' is not a list of numbers", FORMS)
             return cls(name, tuple(map(float, content)))
         if (name, content) == ("speed", {"keeps": "energy"}):
@@ -64,8 +65,8 @@ class Axis:
             raise InputError(f"axis '{name}' is not understood", FORMS)
         bounds = {key: content[key] for key in keys - {"steps"}}
         for key, value in bounds.items():
-            if not (is_number(value) and np.isfinite(value)):
-                raise InputError(f"axis '{name}': {key} = {value!r} is no number", FORMS)
+            if not is_finite(value):
+                raise InputError(f"axis '{name}': {key} = {shortened(value)} is no number", FORMS)
         steps = content.get("steps")
         if steps is not None:
             steps = check_count(f"axis '{name}': steps", steps)
@@ -187,10 +188,17 @@ def _speeds(model: Model, points: dict[str, Array]) -> Array:
 
 
 def grid_size(axes: tuple[Axis, ...]) -> int:
-    """How many points a grid has. Raises `ParameterError` for an axis without steps."""
+    """How many points a grid has. Raises `ParameterError`."""
     size = 1
     for axis in free_axes(axes):
         if not axis.values and axis.steps is None:
             raise ParameterError(f"axis '{axis.name}' has no steps", "give steps = COUNT")
         size *= len(axis.values) or axis.steps or 1
-    return size
+    return check_points(size)
+
+
+def check_points(count: int) -> int:
+    """Return how many points there are. Raises `ParameterError` if they are too many."""
+    if count > MOST_POINTS:
+        raise ParameterError("there are too many points", f"have no more than {MOST_POINTS}")
+    return count

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from flexspine.gaits.continuation import trace_branch
+from dataclasses import dataclass
+
+from flexspine.gaits.continuation import Branch, trace_branch
 from flexspine.gaits.gait import Gait
+from flexspine.gaits.stability import Stability, floquet_multipliers
+from flexspine.hybrid.compile import Array
 
 # Natural units; branches are drawn from their points, so that these have to lie close.
 STEP = 0.1
@@ -26,3 +30,43 @@ def carried(gait: Gait, over: str, value: float) -> Gait:
     if not points:
         raise LostGaitError("; ".join(found.ends))
     return points[0].gait
+
+
+@dataclass(frozen=True)
+class Line:
+    """Gaits of one family over values of one quantity: a branch, or one gait at one value.
+
+    ``reached`` are the lowest and the highest value at which there is a gait.
+    """
+
+    gait: Gait
+    value: float
+    branch: Branch | None
+    reached: tuple[float, float]
+
+    @classmethod
+    def through(cls, gait: Gait, over: str, values: Array, symmetric: bool | None) -> Line:
+        """Follow a gait from the value next to its own to all others. Raises `LostGaitError`."""
+        low, high = float(values.min()), float(values.max())
+        here = {**gait.model.numbers, **gait.quantities}[over]
+        nearest = min(max(here, low), high)
+        gait = carried(gait, over, nearest)
+        if low == high:
+            return cls(gait, nearest, None, (nearest, nearest))
+        branch = trace_branch(
+            gait, over, bounds=(low, high), symmetric=symmetric, longest_step=STEP
+        )
+        known = [point.value for point in branch.points] + [m.value for m in branch.landmarks]
+        return cls(gait, nearest, branch, (min(known), max(known)))
+
+    def at(self, value: float) -> tuple[Gait, Stability] | None:
+        """The gait at a value, if there is one, and its stability."""
+        if self.branch is None:
+            return self.gait, floquet_multipliers(self.gait)
+        points = self.branch.at(value)
+        return (points[0].gait, points[0].stability) if points else None
+
+    @property
+    def end(self) -> str:
+        """Why it leads no further."""
+        return "; ".join(self.branch.ends) if self.branch else ""

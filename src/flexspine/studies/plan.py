@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -16,17 +16,19 @@ import numpy as np
 from flexspine.errors import InputError, ParameterError, PresetError, UnknownNameError
 from flexspine.gaits.files import load_gait
 from flexspine.hybrid.compile import Array
+from flexspine.models.legs import SIDES
 from flexspine.models.many import make_cases
 from flexspine.models.model import TOLERANCES, Model, Source, check_between
 from flexspine.models.presets import load_model
 from flexspine.models.registry import find_kind
 from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
-from flexspine.parameters import build, flattened, is_number, values
+from flexspine.parameters import build, flattened, is_finite, shortened, values
 from flexspine.studies.axes import (
     GRID,
     METHODS,
     OF_GAITS,
     Axis,
+    check_points,
     free_axes,
     grid_points,
     grid_size,
@@ -39,6 +41,11 @@ TASKS = (RUNS, SEARCHES, GAITS)
 # What one piece of work and one file hold: some seconds of it.
 MOST_STRIDES, MOST_RUNS, FEWEST_RUNS = 400_000, 16384, 256
 SEARCHES_EACH = 16
+
+ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
+
+# Seeds fit into a TOML file and into a manifest.
+SEEDS = 2**63
 
 # What each task can be told, besides the tolerance.
 OPTIONS: dict[str, dict[str, type]] = {
@@ -100,6 +107,14 @@ class Plan:
         """How many chunks there are."""
         return self.chunks_each * len(self.models)
 
+    def body(self, model: Model) -> Model:
+        """A model with every parameter as large as the axes make it; see `make_cases`."""
+        known = values(model.parameters)
+        own = {axis.name: known[axis.name] for axis in self.axes if axis.name in known}
+        return model.with_values(
+            {a.name: a.range(own[a.name])[1] for a in self.axes if a.name in own}
+        )
+
     @property
     def tolerance(self) -> float:
         """The integrator's."""
@@ -147,7 +162,7 @@ class Plan:
                 chunk=record["chunk"],
                 options=record["options"],
             )
-        except (KeyError, TypeError, AttributeError):
+        except (KeyError, TypeError, AttributeError, ValueError):
             raise InputError("the record of a sweep is damaged", "begin it anew") from None
 
     @property
@@ -163,7 +178,7 @@ def read_plan(path: str | Path) -> Plan:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as failure:
         raise InputError(f"cannot read '{path}' ({failure.strerror})", "give a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as failure:
+    except (ValueError, RecursionError) as failure:
         raise InputError(f"'{path}' is not valid TOML: {failure}", "mend that line") from None
     try:
         return _plan(content, Path(path).parent)
@@ -197,29 +212,30 @@ def _plan(content: Mapping[str, Any], place: Path) -> Plan:
         if not isinstance(content.get(entry, {}), Mapping):
             raise InputError(f"'{entry}' is not a table", f"write [{entry}]")
     models = [_changed(load_start(n, place), content.get("set", {})) for n in names]
-    axes = [Axis.read(n, what) for n, what in _axes(content["axes"]).items()]
+    axes = [Axis.read(n, what) for n, what in _axes(content["axes"])]
+    options = dict(content.get("options", {}))
+    if isinstance(options.get("fixed"), Mapping):
+        options["fixed"] = flattened(options["fixed"])
     plain = {k: content[k] for k in ("task", "method", "samples", "seed", "chunk") if k in content}
-    return Plan(tuple(models), tuple(axes), options=content.get("options", {}), **plain)
+    return Plan(tuple(models), tuple(axes), options=options, **plain)
 
 
-def _axes(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _axes(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Axes by dotted name, whether it was quoted or written as nested tables."""
     forms = {"low", "high", "around", "within", "steps", "keeps"}
-    flat: dict[str, Any] = {}
     for name, content in table.items():
         if isinstance(content, Mapping) and not content.keys() <= forms:
-            flat |= _axes(content, f"{prefix}{name}.")
+            yield from _axes(content, f"{prefix}{name}.")
         else:
-            flat[f"{prefix}{name}"] = content
-    return flat
+            yield f"{prefix}{name}", content
 
 
 def _changed(model: Model, table: Mapping[str, Any]) -> Model:
     """A model with some values set."""
     given = flattened(table)
     for name, value in given.items():
-        if not is_number(value):
-            raise ParameterError(f"'{name}' = {value!r} is no number", "give a number")
+        if not is_finite(value):
+            raise ParameterError(f"'{name}' = {shortened(value)} is no number", "give a number")
     apex = {name: float(given.pop(name)) for name in list(given) if name in model.apex}
     angles = {
         name.partition(".")[2]: float(given.pop(name))
@@ -239,11 +255,15 @@ def _check(plan: Plan) -> None:
     ):
         if given not in known:
             raise UnknownNameError(what, str(given), known)
-    names = [model.name for model in plan.models]
-    if len(set(names)) < len(names):
-        raise InputError("two models have one name", "give each model once")
-    if not (isinstance(plan.seed, int) and not isinstance(plan.seed, bool) and plan.seed >= 0):
-        raise ParameterError(f"seed = {plan.seed!r} is not usable", "give a whole number from 0 on")
+    if not plan.models:
+        raise InputError("there is no model", "give one or more")
+    _check_once("model", [model.name for model in plan.models])
+    _check_once("axis", [axis.name for axis in plan.axes])
+    if not (type(plan.seed) is int and 0 <= plan.seed < SEEDS):
+        raise ParameterError(
+            f"seed = {shortened(plan.seed)} is not usable",
+            f"give a whole number from 0 to {SEEDS - 1}",
+        )
     if plan.chunk is not None:
         check_count("chunk", plan.chunk)
     if plan.method == GRID:
@@ -253,7 +273,7 @@ def _check(plan: Plan) -> None:
     elif plan.samples is None:
         raise InputError(f"method '{plan.method}' needs samples", "give samples = COUNT")
     else:
-        check_count("samples", plan.samples)
+        check_points(check_count("samples", plan.samples))
     if not free_axes(plan.axes):
         raise InputError("no axis varies", "add one under [axes]")
     if plan.task != RUNS and any(axis.keeps for axis in plan.axes):
@@ -263,14 +283,30 @@ def _check(plan: Plan) -> None:
         _check_axes(plan, model)
 
 
+def _check_once(what: str, names: list[str]) -> None:
+    for name in names:
+        if not isinstance(name, str):
+            raise InputError(f"the {what} {shortened(name)} has no name", "name it")
+        if names.count(name) > 1:
+            raise InputError(f"{what} '{name}' is there twice", "give it once")
+
+
 def _check_options(plan: Plan) -> None:
     known = {**OPTIONS[plan.task], "tolerance": float}
     for name, value in plan.options.items():
         if name not in known:
             raise UnknownNameError(f"option of {plan.task}", name, known)
         if known[name] is not float and not isinstance(value, known[name]):
-            raise ParameterError(f"{name} = {value!r} is not usable", f"see the task '{plan.task}'")
-    check_between("tolerance", plan.tolerance, *TOLERANCES)
+            raise ParameterError(
+                f"{name} = {shortened(value)} is not usable", f"see the task '{plan.task}'"
+            )
+    check_between("tolerance", plan.options.get("tolerance", DEFAULT_TOLERANCE), *TOLERANCES)
+    fixable = {*OF_GAITS, *ANGLES, *(name for model in plan.models for name in model.apex)}
+    for name, value in plan.options.get("fixed", {}).items():
+        if name not in fixable:
+            raise UnknownNameError("quantity to fix", name, fixable)
+        if not is_finite(value):
+            raise ParameterError(f"fixed {name} = {shortened(value)} is no number", "give a number")
     for name in ("strides", "starts"):
         if name in plan.options:
             check_count(name, plan.options[name])
@@ -281,6 +317,12 @@ def _check_options(plan: Plan) -> None:
                 "gaits are followed over the last axis of a grid",
                 f"put '{over}' last, on a grid",
             )
+        for model in plan.models:
+            if over not in {*model.numbers, *OF_GAITS}:
+                raise InputError(
+                    f"'{model.name}' has no {over} over which its gaits could be followed",
+                    "sweep it by itself, over something else",
+                )
 
 
 def _check_axes(plan: Plan, model: Model) -> None:
@@ -294,6 +336,9 @@ def _check_axes(plan: Plan, model: Model) -> None:
         if axis.name not in model.numbers:
             if axis.name in anywhere:
                 continue
+            members = [known for known in anywhere if known.startswith(f"{axis.name}.")]
+            if members:
+                raise InputError(f"axis '{axis.name}' is a group", f"write {sorted(members)[0]}")
             raise UnknownNameError("axis", axis.name, anywhere | quantities)
         make_cases(model, {axis.name: np.array(axis.range(model.numbers[axis.name]))})
 

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexspine.errors import InputError, ParameterError
-from flexspine.gaits.continuation import trace_branch
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.search import DEFAULT_STARTS, find_gaits
 from flexspine.gaits.stability import floquet_multipliers
 from flexspine.models.many import make_cases, run_cases
 from flexspine.models.model import Model
 from flexspine.models.presets import load_model
-from flexspine.studies.following import STEP, LostGaitError, carried
+from flexspine.parameters import values
+from flexspine.studies.axes import OF_GAITS
+from flexspine.studies.following import Line, LostGaitError, carried
 from flexspine.studies.plan import GAITS, RUNS, Plan
 from flexspine.studies.store import DIGEST, TALLY, Part
 from flexspine.studies.tables import Row, gait_row
@@ -57,7 +58,8 @@ def _runs(plan: Plan, chunk: int) -> pa.Table:
     model, first, count = plan.of_chunk(chunk)
     points = plan.at(chunk)
     own = {name: column for name, column in points.items() if name in model.numbers}
-    cases = make_cases(model, own or {"height": np.full(count, model.apex["height"])})
+    own = own or {"height": np.full(count, model.apex["height"])}
+    cases = make_cases(model, own, plan.body(model))
     columns = run_cases(cases, plan.options.get("strides", 1), plan.tolerance)
     given = {column_of(name): column for name, column in own.items()}
     apexes = [f"apex_{name}" for each in plan.models for name in each.apex]
@@ -108,8 +110,9 @@ def _searched(plan: Plan, chunk: int) -> Iterator[Row]:
     model, first, count = plan.of_chunk(chunk)
     points, options = plan.at(chunk), plan.options
     for i in range(count):
-        given = {n: float(c[i]) for n, c in points.items()}
-        row: Row = {"point": first + i, **{column_of(n): v for n, v in given.items()}}
+        row: Row = {"point": first + i}
+        given = {n: float(c[i]) for n, c in points.items() if n in {*model.numbers, *OF_GAITS}}
+        row |= {column_of(name): value for name, value in given.items()}
         seed = np.random.SeedSequence((plan.seed, chunk // plan.chunks_each, first + i))
         try:
             body, fixed = _request(model, given, dict(options.get("fixed", {})), plan.tolerance)
@@ -134,7 +137,7 @@ def _request(
     model: Model, given: dict[str, float], fixed: dict[str, float], tolerance: float
 ) -> tuple[Model, dict[str, float]]:
     """The body to search gaits of and what is fixed: by default the model's own gait's."""
-    parameters = {n: v for n, v in given.items() if n in model.parameter_names}
+    parameters = {n: v for n, v in given.items() if n in values(model.parameters)}
     body = model.with_values(parameters) if parameters else model
     if not fixed:
         own = examine(model, tolerance=tolerance)
@@ -148,39 +151,30 @@ def _followed(plan: Plan, chunk: int) -> Iterator[Row]:
     """The gait at every point of a line, followed from the model's own."""
     model, first, count = plan.of_chunk(chunk)
     points, over = plan.at(chunk), plan.axes[-1].name
-    line = points[over]
+    given = {name: column for name, column in points.items() if name in {*model.numbers, *OF_GAITS}}
     rows: list[Row] = [
-        {"point": first + i, **{column_of(n): float(c[i]) for n, c in points.items()}}
+        {"point": first + i, **{column_of(n): float(c[i]) for n, c in given.items()}}
         for i in range(count)
     ]
     try:
         gait = examine(model, tolerance=plan.tolerance)
         if gait.flaw is not None:
             raise LostGaitError(f"the start of '{model.name}' is no gait: {gait.flaw}")
-        for name, values in points.items():
+        for name, column in given.items():
             if name != over:
-                gait = carried(gait, name, float(values[0]))
-        low, high = float(line.min()), float(line.max())
-        here = {**gait.model.numbers, **gait.quantities}[over]
-        gait = carried(gait, over, min(max(here, low), high))
-        symmetric = plan.options.get("symmetric")
-        branch = trace_branch(
-            gait, over, bounds=(low, high), symmetric=symmetric, longest_step=STEP
-        )
+                gait = carried(gait, name, float(column[0]))
+        line = Line.through(gait, over, given[over], plan.options.get("symmetric"))
     except (LostGaitError, InputError) as failure:
         for row in rows:
             yield {**row, "outcome": NONE, "reason": str(failure)}
         return
-    reached = [point.value for point in branch.points]
-    reached += [mark.value for mark in branch.landmarks]
-    for row, value in zip(rows, line, strict=True):
-        row |= {"branch_from": min(reached), "branch_to": max(reached)}
-        there = branch.at(float(value))
-        if not there:
-            yield {**row, "outcome": NONE, "reason": "; ".join(branch.ends)}
-            continue
-        found = gait_row(there[0].gait, there[0].stability)
-        yield {**row, **found, "outcome": FOUND, "gait": 0}
+    for row, value in zip(rows, given[over].tolist(), strict=True):
+        row |= {"branch_from": line.reached[0], "branch_to": line.reached[1]}
+        there = line.at(value)
+        if there is None:
+            yield {**row, "outcome": NONE, "reason": line.end}
+        else:
+            yield {**row, **gait_row(*there), "outcome": FOUND, "gait": 0}
 
 
 def _found(gait: Gait) -> Row:
