@@ -8,7 +8,8 @@ from types import FrameType
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
-    signal.signal(signal.SIGINT, _leave)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _leave)
     from flexspine.cli.app import run
 
     sys.exit(run(sys.argv[1:]))

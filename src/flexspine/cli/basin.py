@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import signal
 from collections.abc import Mapping, Sequence
 from json import dumps as json_text
 from math import isfinite, nan
@@ -13,12 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
-from flexspine.cli.bound import refuse_besides_gait
-from flexspine.cli.branch import _start
 from flexspine.cli.options import Assignments, Json
-from flexspine.cli.output import counting, print_json, steps
-from flexspine.cli.sweep import Processes, Scheduler, cores, unfinished_is_kept
-from flexspine.errors import FlexspineError, InputError
+from flexspine.cli.output import counting, print_json
+from flexspine.cli.starts import start_of
+from flexspine.cli.sweep import Processes, Scheduler, count_of, unfinished_is_kept
+from flexspine.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,35 +107,6 @@ def basin(
         print(_report(basins, done))
         print(f"results in {out}")
     return 0
-
-
-def count_of(processes: int | None) -> int:
-    """How many processes to use. Raises `ParameterError`."""
-    from flexspine.models.simulation import check_count
-
-    return cores() if processes is None else check_count("--processes", processes)
-
-
-def start_of(preset: str, file: Path | None, set_: list[str] | None) -> Gait:
-    """The gait of a file, if there is one, or of a preset. Raises `FlexspineError` if none is."""
-    from flexspine.gaits.files import load_gait
-    from flexspine.gaits.gait import examine
-    from flexspine.models.presets import load_model
-
-    if file is not None:
-        refuse_besides_gait({"--set": set_})
-    found = examine(load_model(preset)) if file is None else load_gait(file)
-    if found.flaw is not None:
-        # No InputError: its exit code is that of what ended without its goal.
-        raise FlexspineError(
-            f"the start of '{preset if file is None else file}' is no gait: {found.flaw}",
-            "find one with 'flexspine gait --out' and give it with --gait",
-        )
-    if not set_:
-        return found
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    with steps() as progress:
-        return _start(None, preset, set_, None, progress)
 
 
 def keep_beside(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_PRESET,
     Apex,
@@ -69,7 +69,7 @@ def bound(
     from flexspine.models.presets import load_model
     from flexspine.models.simulation import DEFAULT_TOLERANCE, simulate
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    interruptible()
     step = DEFAULT_INTERVAL if interval is None else interval
     check_interval(step)
     if gait is not None:

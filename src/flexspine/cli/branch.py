@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import signal
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,21 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine.cli.bound import refuse_besides_gait
-from flexspine.cli.gait import own_gait
+from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
-    DEFAULT_PRESET,
     Assignments,
     GaitFile,
     Json,
     Preset,
     Symmetric,
-    assignments,
     check_number,
     numbers,
 )
 from flexspine.cli.output import Steps, print_json, steps
-from flexspine.errors import FlexspineError, InputError, ParameterError, UnknownNameError
+from flexspine.cli.starts import starting_gait
+from flexspine.errors import InputError, ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
     from flexspine.gaits.family import BranchPoint
@@ -85,14 +82,14 @@ def branch(
     from flexspine.gaits.gait_record import branch_record
     from flexspine.gaits.tracing import LONGEST_STEP
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    interruptible()
     step = LONGEST_STEP if longest_step is None else longest_step
     check_number("--longest-step", step)
     if step <= 0:
         raise ParameterError(f"--longest-step = {step:g} is not usable", "give a number above zero")
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        start = _start(gait, preset, set_, symmetric, progress)
+        start = starting_gait(gait, preset, set_, symmetric, progress)
         begin = _value(start, over)
         fixed = _kept(start, over, keep)
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
@@ -147,52 +144,6 @@ class _Counter:
         self.progress.begin(f"{self.count} gaits, {self.over} = {point.value:.6g}")
         span = self.bounds[1] - self.bounds[0]
         self.progress.at((self.seen[1] - self.seen[0]) / span)
-
-
-def _start(
-    file: Path | None,
-    preset: str | None,
-    set_: list[str] | None,
-    symmetric: bool | None,
-    progress: Steps,
-) -> Gait:
-    """The gait to start from. Raises `InputError`, and `FlexspineError` if there is none."""
-    from flexspine.gaits.files import load_gait
-    from flexspine.gaits.search import find_gaits
-    from flexspine.models.presets import load_model
-
-    if file is not None:
-        refuse_besides_gait({"--preset": preset, "--set": set_})
-        saved = load_gait(file)
-        if saved.flaw is not None:
-            raise InputError(
-                f"'{file}' holds no gait: {saved.flaw}", "find one with 'flexspine gait --out'"
-            )
-        return saved
-    name = DEFAULT_PRESET if preset is None else preset
-    model = load_model(name, assignments("--set", set_))
-    own = own_gait(name, "find one with 'flexspine gait --out' and give it with --gait")
-    if model.parameters == own.model.parameters:
-        return own
-    progress.begin("looking for the gait to start from")
-    found = find_gaits(model, own.quantities, symmetric=symmetric, progress=progress.at)
-    if not found.gaits:
-        # No InputError: its exit code is that of a run that ended without its goal.
-        raise FlexspineError(
-            f"'{name}' with these parameters has no gait at the energy, apex height and mean "
-            f"speed of its own ({found.advice})",
-            "find one elsewhere with 'flexspine gait --out' and give it with --gait",
-        )
-    mirrored = [other for other in found if other.symmetric]
-    return min(mirrored or found, key=lambda other: _distance(other, own))
-
-
-def _distance(one: Gait, other: Gait) -> float:
-    """How far two gaits are apart, squared, in natural units."""
-    scales = other.model.scales
-    apart = [(one.model.apex[n] - other.model.apex[n]) / scales[n] for n in one.model.apex]
-    apart += [one.touchdown_angles[n] - other.touchdown_angles[n] for n in one.touchdown_angles]
-    return sum(difference**2 for difference in apart)
 
 
 def _value(start: Gait, over: str) -> float:

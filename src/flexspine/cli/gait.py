@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import signal
 import sys
 from contextlib import ExitStack
 from math import hypot
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION
+from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_PRESET,
     Assignments,
@@ -25,6 +25,7 @@ from flexspine.cli.options import (
     span,
 )
 from flexspine.cli.output import Steps, print_json, steps
+from flexspine.cli.starts import own_gait
 from flexspine.errors import InputError, ParameterError
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def gait(
     from flexspine.gaits.search import DEFAULT_STARTS, find_gaits
     from flexspine.models.presets import load_model
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    interruptible()
     name = DEFAULT_PRESET if preset is None else preset
     model = load_model(name, assignments("--set", set_))
     fixed = _fixed(name, {"energy": energy, "height": height, "mean_speed": speed}, fix)
@@ -135,17 +136,6 @@ def gait(
     if not record["gaits"]:
         print(f"flexspine: no gait found: {found.advice}", file=sys.stderr)
     return 0 if record["gaits"] else 1
-
-
-def own_gait(preset: str, remedy: str) -> Gait:
-    """The gait that a preset starts in. Raises `ParameterError` if it starts in none."""
-    from flexspine.gaits.gait import examine
-    from flexspine.models.presets import load_model
-
-    own = examine(load_model(preset))
-    if own.flaw is not None:
-        raise ParameterError(f"the start of '{preset}' is no gait: {own.flaw}", remedy)
-    return own
 
 
 def _fixed(preset: str, named: dict[str, float | None], fix: list[str] | None) -> dict[str, float]:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
-from flexspine.cli.basin import Out, count_of, how_made, keep_beside, start_of
+from flexspine.cli.basin import Out, how_made, keep_beside
 from flexspine.cli.options import DEFAULT_PRESET, Assignments, GaitFile, Json, Preset, span
 from flexspine.cli.output import counting, print_json
-from flexspine.cli.sweep import Processes, Scheduler, unfinished_is_kept
+from flexspine.cli.starts import start_of
+from flexspine.cli.sweep import Processes, Scheduler, count_of, unfinished_is_kept
 from flexspine.errors import InputError
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import signal
 import sys
 import textwrap
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json, span
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.errors import ParameterError
@@ -71,7 +71,7 @@ def study(
     from flexspine.studies.claims import verdicts
     from flexspine.studies.spines import Setting, study_spines
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on there is work to undo
+    interruptible()
     usual = Setting()
     setting = Setting(
         energy=energy,

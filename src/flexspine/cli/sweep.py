@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
 from flexspine.cli.output import counting, print_json
 
@@ -53,7 +53,7 @@ def sweep(
 
     with unfinished_is_kept(out), counting("points") as progress:
         done = carry_out(
-            plan, out, processes=processes or cores(), client=scheduler, progress=progress
+            plan, out, processes=count_of(processes), client=scheduler, progress=progress
         )
     if json:
         print_json(_record(done))
@@ -81,10 +81,10 @@ def rerun(
     """
     from flexspine.studies.sweep import rerun as repeat
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interruptible()
     with counting("chunks") as progress:
         found = repeat(
-            directory, processes=processes or cores(), client=scheduler, progress=progress
+            directory, processes=count_of(processes), client=scheduler, progress=progress
         )
     if json:
         print_json(
@@ -101,20 +101,26 @@ def rerun(
         print(f"the same: all {found.chunks} chunks")
     else:
         print(f"not the same: {len(found.differing)} of {found.chunks} chunks differ")
+        for file in found.differing.values():
+            print(f"  {file}")
         for name, (before, now) in found.changed.items():
             print(f"  {name} was {before}, is {now}")
     return 0 if found.same else 1
 
 
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0))
+def count_of(processes: int | None) -> int:
+    """How many processes to use: by default one for each core that this process may use."""
+    from flexspine.models.simulation import check_count
+
+    if processes is None:
+        return len(os.sched_getaffinity(0))
+    return check_count("--processes", processes)
 
 
 @contextmanager
 def unfinished_is_kept(out: Path) -> Iterator[None]:
     """Let work be interrupted, and tell then where it goes on from."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interruptible()
     try:
         yield
     except KeyboardInterrupt:

@@ -26,7 +26,7 @@ from flexspine.models.simulation import check_count
 from flexspine.studies.axes import GRID, Axis, free_axes, grid_points
 from flexspine.studies.following import STEP
 from flexspine.studies.plan import RUNS, Plan
-from flexspine.studies.store import Store, read_manifest
+from flexspine.studies.store import Store, read_plan_of
 from flexspine.studies.tables import Row
 
 STRIDES, POINTS = 100, 100
@@ -204,7 +204,7 @@ def _check_gait(name: str, gait: Gait, over: Mapping[str, float]) -> None:
 def read_basins(path: str | Path) -> list[Basin]:
     """Read what a sweep of `basin_plan` has found. Raises `InputError`."""
     folder = Path(path)
-    plan = Plan.revive(read_manifest(folder)["plan"])
+    plan = read_plan_of(folder)
     free = free_axes(plan.axes)
     slices = len(free) == 2 and all(axis.within and axis.steps for axis in free)
     if plan.task != RUNS or plan.method != GRID or not slices:

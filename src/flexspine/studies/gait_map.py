@@ -17,7 +17,7 @@ from flexspine.models.simulation import check_count
 from flexspine.studies.axes import GRID, Axis
 from flexspine.studies.basin import read_columns
 from flexspine.studies.plan import GAITS, Plan
-from flexspine.studies.store import Store, read_manifest
+from flexspine.studies.store import Store, read_plan_of
 from flexspine.studies.tables import Row
 
 STIFFNESS, SPEED = "spine.stiffness", "mean_speed"
@@ -135,7 +135,7 @@ def map_plan(
 def read_map(path: str | Path) -> GaitMap:
     """Read what a sweep of `map_plan` has found. Raises `InputError`."""
     folder = Path(path)
-    plan = Plan.revive(read_manifest(folder)["plan"])
+    plan = read_plan_of(folder)
     names = tuple(axis.name for axis in plan.axes)
     if (plan.task, plan.method, names) != (GAITS, GRID, (STIFFNESS, SPEED)):
         raise InputError(f"'{folder}' holds no map", "give a directory of 'flexspine map'")

@@ -12,38 +12,22 @@ import json
 import os
 import platform
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any
 from urllib.parse import quote
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.errors import OUT_OF_SPACE, InputError, OutputError
 from flexspine.parameters import shortened
+from flexspine.studies.parts import Part, read_about
 from flexspine.studies.plan import Plan
 
-MANIFEST, ROWS, LOCK = "manifest.json", "rows", ".lock"
-DIGEST, TALLY = b"flexspine.digest", b"flexspine.tally"
+MANIFEST, ROWS, LOCK, PARTIAL = "manifest.json", "rows", ".flexspine-lock", ".partial-"
+ENTRIES = {"key": str, "plan": dict, "made_with": dict}
 LIBRARIES = ("heyoka", "numpy", "scipy", "sympy", "pyarrow")
-
-
-class Part(NamedTuple):
-    """A finished chunk: its file, how many rows it has, and a digest of them."""
-
-    content: bytes
-    rows: int
-    digest: str
-
-
-class About(NamedTuple):
-    """What a finished file says of its rows: how many, their digest, outcomes and strides."""
-
-    rows: int
-    digest: str
-    outcomes: Mapping[str, int]
-    strides: int
 
 
 class Store:
@@ -52,6 +36,8 @@ class Store:
     def __init__(self, path: Path, plan: Plan) -> None:
         self.path, self.plan = path, plan
         self.finished: set[int] = set()
+        self.manifest: dict[str, Any] = {}
+        self._maker = made_with()
 
     @contextmanager
     def opened(self) -> Iterator[Store]:
@@ -59,7 +45,8 @@ class Store:
         new = [p for p in (self.path, *self.path.parents) if not p.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            lock = (self.path / LOCK).open("w")
+            self._refuse_what_is_not_ours()
+            lock = self._lock()
         except OSError as failure:
             if failure.errno in OUT_OF_SPACE:
                 raise
@@ -67,13 +54,6 @@ class Store:
                 f"cannot write to '{self.path}' ({failure.strerror})", "give another directory"
             ) from None
         with lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise OutputError(
-                    f"another process is at work in '{self.path}'",
-                    "wait for it, or give another directory",
-                ) from None
             try:
                 self._begin()
                 yield self
@@ -84,23 +64,59 @@ class Store:
                         if made.is_dir() and not any(made.iterdir()):
                             made.rmdir()
 
-    def _begin(self) -> None:
-        for left in self.path.rglob(".partial-*"):
-            left.unlink()
-        if not (self.path / MANIFEST).exists():
-            if any(entry.name != LOCK for entry in self.path.iterdir()):
-                raise OutputError(
-                    f"'{self.path}' holds something else", "give an empty or a new directory"
-                )
-            self._write_manifest(finished=False)
+    def _refuse_what_is_not_ours(self) -> None:
+        """Only what was killed before it had a manifest leaves anything without one."""
+        if (self.path / MANIFEST).exists():
             return
-        known = read_manifest(self.path)
-        if known["key"] != self.plan.key:
-            what = _difference(known["plan"], self.plan.record())
+        for entry in self.path.iterdir():
+            locks = entry.name == LOCK and not entry.stat().st_size
+            if not locks and entry.name != f"{PARTIAL}{MANIFEST}":
+                raise OutputError(
+                    f"'{self.path}' holds something else ({entry.name})",
+                    "give an empty or a new directory",
+                )
+
+    def _lock(self) -> IO[str]:
+        """Take the lock; whoever had it may have deleted its file meanwhile."""
+        while True:
+            lock = (self.path / LOCK).open("a")
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                lock.close()
+                raise OutputError(
+                    f"another process is at work in '{self.path}'",
+                    "wait for it, or give another directory",
+                ) from None
+            try:
+                if os.path.samestat(os.fstat(lock.fileno()), (self.path / LOCK).stat()):
+                    return lock
+            except FileNotFoundError:
+                pass
+            lock.close()
+
+    def _begin(self) -> None:
+        if not (self.path / MANIFEST).exists():
+            self.manifest = {
+                "schema_version": SCHEMA_VERSION,
+                "kind": "sweep",
+                "key": self.plan.key,
+                "plan": self.plan.record(),
+                "chunks": self.plan.chunks,
+                "made_with": self._maker,
+            }
+            self._write_manifest()
+            return
+        self.manifest = read_manifest(self.path)
+        if self.manifest["key"] != self.plan.key:
+            what = _difference(self.manifest["plan"], self.plan.record())
             raise InputError(
                 f"'{self.path}' holds a sweep with another configuration ({what})",
                 "give another directory, or the configuration it was begun with",
             )
+        for folder in (self.path, *self.path.glob(f"{ROWS}/*")):
+            for left in folder.glob(f"{PARTIAL}*"):
+                left.unlink()
         self.finished = {n for n in range(self.plan.chunks) if self.file(n).exists()}
 
     def file(self, chunk: int) -> Path:
@@ -111,14 +127,22 @@ class Store:
 
     def add(self, chunk: int, part: Part) -> None:
         """Keep a finished chunk."""
+        self._note_maker()
         file = self.file(chunk)
         file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, part.content)
         self.finished.add(chunk)
 
+    def _note_maker(self) -> None:
+        """Keep on record that what makes rows now is not what began."""
+        makers = [self.manifest["made_with"], *self.manifest.get("also_made_with", [])]
+        if self._maker not in makers:
+            self.manifest["also_made_with"] = [*makers[1:], self._maker]
+            self._write_manifest()
+
     def finish(self) -> dict[str, Any]:
         """Note that all chunks are there, and return what they are together."""
-        parts = [read_digest(self.file(n)) for n in sorted(self.finished)]
+        parts = [read_about(self.file(n)) for n in sorted(self.finished)]
         outcomes: Counter[str] = Counter()
         for part in parts:
             outcomes.update(part.outcomes)
@@ -128,34 +152,28 @@ class Store:
             "strides": sum(part.strides for part in parts),
             "digest": hashlib.sha256("".join(part.digest for part in parts).encode()).hexdigest(),
         }
-        self._write_manifest(finished=True, **found)
+        self.manifest |= {"finished": True, **found}
+        self._write_manifest()
         return found
 
-    def _write_manifest(self, **more: Any) -> None:
-        manifest = {
-            "schema_version": SCHEMA_VERSION,
-            "kind": "sweep",
-            "key": self.plan.key,
-            "plan": self.plan.record(),
-            "chunks": self.plan.chunks,
-            "made_with": made_with(),
-            **more,
-        }
-        text = json.dumps(manifest, indent=2, allow_nan=False) + "\n"
+    def _write_manifest(self) -> None:
+        text = json.dumps(self.manifest, indent=2, allow_nan=False) + "\n"
         write_whole(self.path / MANIFEST, text.encode())
 
 
 def write_whole(file: Path, content: bytes) -> None:
     """Write a file under another name, then rename it; on failure nothing is left."""
-    partial = file.with_name(f".partial-{file.name}")
+    partial = file.with_name(f"{PARTIAL}{file.name}")
     try:
         with partial.open("wb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
         partial.replace(file)
-    except BaseException:
+    except BaseException as failure:
         partial.unlink(missing_ok=True)
+        if isinstance(failure, OSError) and failure.filename is None:
+            failure.filename = str(file)  # the system tells only of which file it opened
         raise
 
 
@@ -170,23 +188,24 @@ def read_manifest(path: Path) -> dict[str, Any]:
         ) from None
     except ValueError:
         manifest = None
-    if not (isinstance(manifest, dict) and {"key", "plan", "made_with"} <= manifest.keys()):
+    known = manifest if isinstance(manifest, dict) else {}
+    if not all(isinstance(known.get(entry), kind) for entry, kind in ENTRIES.items()):
         raise InputError(f"the manifest in '{path}' is damaged", "begin the sweep anew")
-    return manifest
+    return known
 
 
-def read_digest(file: Path) -> About:
-    """What a finished file says of its rows. Raises `InputError`."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
+def read_plan_of(path: Path) -> Plan:
+    """The plan of a directory. Raises `InputError`."""
+    manifest = read_manifest(path)
     try:
-        about = pq.read_metadata(file)
-        tally = json.loads(about.metadata[TALLY])
-        digest = about.metadata[DIGEST].decode()
-        return About(about.num_rows, digest, tally["outcomes"], tally["strides"])
-    except (pa.ArrowInvalid, KeyError, TypeError, ValueError):
-        raise InputError(f"'{file}' is damaged", "delete it; the sweep makes it anew") from None
+        plan = Plan.revive(manifest["plan"])
+    except InputError as failure:
+        raise InputError(
+            f"the manifest in '{path}' is damaged ({failure.message})", "begin the sweep anew"
+        ) from None
+    if plan.key != manifest["key"]:
+        raise InputError(f"the manifest in '{path}' was changed", "begin the sweep anew")
+    return plan
 
 
 def made_with() -> dict[str, str]:
@@ -211,8 +230,14 @@ def _difference(before: Any, now: Any, where: str = "") -> str:
             if before.get(name) != now.get(name):
                 inner = f"{where}.{name}" if where else name
                 return _difference(before.get(name), now.get(name), inner)
+    if isinstance(before, list) and isinstance(now, list) and _names(before) != _names(now):
+        return f"{where} were {_names(before)} and are {_names(now)}"
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         for number, (one, other) in enumerate(zip(before, now, strict=True)):
             if one != other:
                 return _difference(one, other, f"{where}[{number}]")
     return f"{where} was {shortened(before)} and is {shortened(now)}"
+
+
+def _names(records: list[Any]) -> str:
+    return ", ".join(str(record["name"]) for record in records if isinstance(record, dict))

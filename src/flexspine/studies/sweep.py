@@ -10,8 +10,9 @@ from typing import Any
 
 from flexspine.errors import InputError
 from flexspine.models.simulation import check_count
+from flexspine.studies.parts import digest_of
 from flexspine.studies.plan import Plan, read_plan
-from flexspine.studies.store import Store, read_digest, read_manifest
+from flexspine.studies.store import Store, made_with, read_manifest, read_plan_of
 from flexspine.studies.tasks import do_chunk
 from flexspine.workers.crew import Crew
 from flexspine.workers.local import LocalWorkers
@@ -54,21 +55,22 @@ def sweep(
     ``plan`` is one or the TOML file of one. Interrupted or killed, the same call goes on with the
     same directory. ``processes`` are local; ``client`` is a Dask client, or a scheduler's address
     such as ``tcp://host:8786``, in their place. ``progress`` is told how many points are done, and
-    of how many. Raises `InputError`, and `MachineError` where workers fail.
+    of how many. Raises `InputError`, `MachineError` where workers fail, and `OSError` where the
+    disk does.
     """
     plan = plan if isinstance(plan, Plan) else read_plan(plan)
     begun = time.monotonic()
-    with Store(Path(out), plan).opened() as store:
+    workers = min(check_count("processes", processes), plan.chunks)
+    # Workers that cannot be had leave no directory behind.
+    with crew_of(workers, client) as crew, Store(Path(out), plan).opened() as store:
         missing = [n for n in range(plan.chunks) if n not in store.finished]
         whole = plan.points * len(plan.models)
         done = whole - sum(plan.of_chunk(n)[2] for n in missing)
         progress(done, whole)
-        if missing:
-            with crew_of(min(check_count("processes", processes), len(missing)), client) as crew:
-                for chunk, part in crew.map(do_chunk, ((n, (plan, n)) for n in missing)):
-                    store.add(chunk, part)
-                    done += plan.of_chunk(chunk)[2]
-                    progress(done, whole)
+        for chunk, part in crew.map(do_chunk, ((n, (plan, n)) for n in missing)):
+            store.add(chunk, part)
+            done += plan.of_chunk(chunk)[2]
+            progress(done, whole)
         found = store.finish()
     return Sweep(Path(out), plan, **found, made=len(missing), seconds=time.monotonic() - begun)
 
@@ -84,13 +86,13 @@ def crew_of(processes: int, client: Any) -> Crew:
 
 @dataclass(frozen=True)
 class Rerun:
-    """Whether a sweep came out the same: ``differing`` are chunks that did not.
+    """Whether a sweep came out the same: ``differing`` are chunks that did not, with their files.
 
     ``changed`` tells, by name, what it was made with and what that is now, where they differ.
     """
 
     chunks: int
-    differing: tuple[int, ...]
+    differing: Mapping[int, Path]
     changed: Mapping[str, tuple[str, str]]
 
     @property
@@ -110,21 +112,18 @@ def rerun(
 
     Nothing is written. An unfinished sweep is repeated as far as it got. Raises as `sweep`.
     """
-    from flexspine.studies.store import made_with
-
-    manifest = read_manifest(Path(path))
-    plan = Plan.revive(manifest["plan"])
+    manifest, plan = read_manifest(Path(path)), read_plan_of(Path(path))
     store = Store(Path(path), plan)
     chunks = [n for n in range(plan.chunks) if store.file(n).exists()]
     if not chunks:
         raise InputError(f"'{path}' has no finished chunk", "finish the sweep first")
-    differing: list[int] = []
+    differing: dict[int, Path] = {}
     with crew_of(min(check_count("processes", processes), len(chunks)), client) as crew:
         jobs = ((n, (plan, n)) for n in chunks)
         for count, (chunk, part) in enumerate(crew.map(do_chunk, jobs), start=1):
-            if part.digest != read_digest(store.file(chunk)).digest:
-                differing.append(chunk)
+            if part.digest != digest_of(store.file(chunk)):
+                differing[chunk] = store.file(chunk)
             progress(count, len(chunks))
     before, now = manifest["made_with"], made_with()
     changed = {n: (before.get(n, ""), v) for n, v in now.items() if before.get(n) != v}
-    return Rerun(len(chunks), tuple(sorted(differing)), changed)
+    return Rerun(len(chunks), dict(sorted(differing.items())), changed)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
-from collections import Counter
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -22,8 +18,8 @@ from flexspine.models.presets import load_model
 from flexspine.parameters import values
 from flexspine.studies.axes import OF_GAITS
 from flexspine.studies.following import Line, LostGaitError, carried
+from flexspine.studies.parts import Part, make_part
 from flexspine.studies.plan import GAITS, RUNS, Plan
-from flexspine.studies.store import DIGEST, TALLY, Part
 from flexspine.studies.tables import Row, gait_row
 
 if TYPE_CHECKING:
@@ -44,7 +40,7 @@ def do_chunk(work: tuple[Plan, int]) -> Part:
     """Do the task at the points of a chunk."""
     plan, chunk = work
     table = _runs(plan, chunk) if plan.task == RUNS else _gaits(plan, chunk)
-    return _part(table)
+    return make_part(table)
 
 
 def column_of(axis: str) -> str:
@@ -179,23 +175,3 @@ def _followed(plan: Plan, chunk: int) -> Iterator[Row]:
 
 def _found(gait: Gait) -> Row:
     return {**gait_row(gait, floquet_multipliers(gait)), "outcome": FOUND}
-
-
-def _part(table: pa.Table) -> Part:
-    """A table as a file, with a digest of its rows and what they amount to."""
-    import pyarrow.parquet as pq
-
-    digest = hashlib.sha256()
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        digest.update(name.encode())
-        if column.type == _type("duration"):
-            digest.update(column.to_numpy().tobytes())
-        else:
-            digest.update(json.dumps(column.to_pylist()).encode())
-    tally = Counter(table["outcome"].to_pylist())
-    strides = int(sum(table["strides"].to_pylist())) if "strides" in table.column_names else 0
-    told = json.dumps({"outcomes": tally, "strides": strides})
-    table = table.replace_schema_metadata({DIGEST: digest.hexdigest(), TALLY: told})
-    stream = io.BytesIO()
-    pq.write_table(table, stream, compression="zstd")
-    return Part(stream.getvalue(), table.num_rows, digest.hexdigest())

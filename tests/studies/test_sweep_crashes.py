@@ -1,0 +1,468 @@
+"""Sweeps that are killed, interrupted, out of space or done twice at once, and gone on with."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow.parquet as pq
+import pytest
+
+from flexspine import Sweep, read_plan, sweep
+from flexspine.cli import app
+from flexspine.errors import OutputError
+from flexspine.studies.store import Store
+from tests.studies.test_sweep import files_of, processes_of, rows_of
+
+ROOT = Path(__file__).parents[2]
+
+PLAN = """
+model = "scout2"
+method = "random"
+samples = 120
+chunk = 10
+[axes]
+speed = { around = 0.02 }
+height = { around = 0.02 }
+"""
+CHUNKS = 12
+
+# s; what a chunk takes at least, so that there is time to kill who does it.
+SLOW = 0.15
+
+# s; what a process that has lost its parent may take to leave.
+LEAVING = 10.0
+
+
+class Whole(NamedTuple):
+    """A sweep that nobody disturbed."""
+
+    plan: Path
+    done: Sweep
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """Its Parquet files."""
+        return files_of(self.done)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "plan.toml").write_text(PLAN)
+    return Whole(folder / "plan.toml", sweep(folder / "plan.toml", folder / "out"))
+
+
+# What runs in other processes: the command, which notes the chunks it begins, or dies at a write.
+
+
+def noted(work: tuple[Any, int]) -> Any:
+    """Do a chunk, not too fast, and note its number before."""
+    from flexspine.studies.tasks import do_chunk
+
+    with Path(os.environ["NOTES"]).open("a") as notes:
+        notes.write(f"{work[1]}\n")
+    time.sleep(SLOW)
+    return do_chunk(work)
+
+
+def noting() -> None:
+    """The command line, noting every chunk."""
+    from flexspine.__main__ import main
+    from flexspine.studies import sweep as sweeps
+
+    sweeps.do_chunk = noted
+    main()
+
+
+def dying() -> None:
+    """The command line, killed at a certain write: ``HOW`` at the ``NUMBER``-th."""
+    from flexspine.__main__ import main
+
+    how, left = os.environ["HOW"], int(os.environ["NUMBER"])
+    sync, replace = os.fsync, Path.replace
+
+    def at_last() -> bool:
+        nonlocal left
+        left -= 1
+        return left == 0
+
+    def half_written(file: int) -> None:
+        if at_last():
+            os.ftruncate(file, os.fstat(file).st_size // 2)
+            os.kill(os.getpid(), signal.SIGKILL)
+        sync(file)
+
+    def renaming(path: Path, target: Path) -> Path:
+        if at_last():
+            if how == "renamed":
+                replace(path, target)
+            os.kill(os.getpid(), signal.SIGKILL)
+        return replace(path, target)
+
+    if how == "half written":
+        os.fsync = half_written
+    else:
+        Path.replace = renaming  # type: ignore[method-assign]
+    main()
+
+
+def begin(what: Any, out: Path, plan: Path, processes: int = 1, **more: str) -> Any:
+    """Start the command in a process of its own."""
+    code = f"from {__name__} import {what.__name__}; {what.__name__}()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, "sweep", plan, "--out", out, "--json",
+         "--processes", str(processes)],
+        cwd=ROOT,
+        env={**os.environ, "NOTES": str(out.with_suffix(".notes")), **more},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+
+
+def parts_in(out: Path) -> list[int]:
+    """Numbers of the chunks that are finished."""
+    return sorted(int(path.stem.removeprefix("part-")) for path in out.glob("rows/*/part-*"))
+
+
+def wait_for_parts(process: Any, out: Path, count: int) -> None:
+    while len(parts_in(out)) < count:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+
+
+def notes_of(out: Path) -> list[int]:
+    notes = out.with_suffix(".notes")
+    return [int(line) for line in notes.read_text().split()] if notes.exists() else []
+
+
+def living(processes: list[int]) -> list[int]:
+    """Those that are still there and have not ended."""
+    found = []
+    for process in processes:
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            continue
+        if state not in "ZX":
+            found.append(process)
+    return found
+
+
+def assert_all_leave(processes: list[int]) -> None:
+    end = time.monotonic() + LEAVING
+    while living(processes) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert living(processes) == []
+
+
+def assert_finished_chunks_are_whole(out: Path, whole: Whole) -> None:
+    """Bit for bit those of an undisturbed sweep, and nothing else is there."""
+    files = {str(f.relative_to(out / "rows")): f for f in out.rglob("part-*")}
+    for name, file in files.items():
+        assert file.read_bytes() == whole.files[name]
+        assert len(pq.ParquetFile(file).read()) > 0
+
+
+def assert_is_whole(out: Path, whole: Whole) -> None:
+    """Complete, and file for file that of an undisturbed sweep."""
+    done = sweep(whole.plan, out)
+    assert done.made == 0
+    assert done.digest == whole.done.digest
+    assert files_of(done) == whole.files
+    points = [row["point"] for row in rows_of(done)]
+    assert points == list(range(done.plan.points))
+    assert {path.name for path in out.iterdir()} == {"manifest.json", "rows"}
+
+
+@pytest.mark.parametrize(("processes", "moments"), [(1, (1, 4, 9)), (2, (3,))])
+def test_killed_at_any_moment_it_goes_on_and_loses_only_what_was_being_done(
+    whole: Whole, tmp_path: Path, processes: int, moments: tuple[int, ...]
+) -> None:
+    out, chance = tmp_path / "out", random.Random(processes)
+    finished: list[int] = []
+    begun: list[int] = []
+    for moment in moments:
+        process = begin(noting, out, whole.plan, processes)
+        wait_for_parts(process, out, moment)
+        time.sleep(chance.uniform(0, 0.2))
+        family = processes_of(process.pid)
+        assert len(family) == 1 if processes == 1 else len(family) >= 1 + processes
+        process.kill()
+        output, _ = process.communicate()
+        assert output == ""
+        assert_all_leave(family)
+        now, notes = parts_in(out), notes_of(out)
+        assert not set(notes[len(begun) :]) & set(finished), "finished chunks are not repeated"
+        lost = len(notes) - len(begun) - (len(now) - len(finished))
+        # A worker may have begun its next chunk before the last one was written.
+        assert 0 <= lost <= (1 if processes == 1 else 2 * processes)
+        assert_finished_chunks_are_whole(out, whole)
+        finished, begun = now, notes
+    last = begin(noting, out, whole.plan)  # as many processes as one likes
+    output, errors = last.communicate(timeout=120)
+    assert last.returncode == 0, errors
+    assert json.loads(output)["made"] == CHUNKS - len(finished)
+    assert json.loads(output)["digest"] == whole.done.digest
+    assert sorted(notes_of(out)[len(begun) :]) == sorted(set(range(CHUNKS)) - set(finished))
+    assert_is_whole(out, whole)
+
+
+@pytest.mark.parametrize(
+    ("how", "number", "kept"),
+    [
+        ("half written", 1, 0),  # the manifest
+        ("half written", 5, 3),
+        ("renamed", 5, 4),
+        ("not yet renamed", 14, 12),  # the manifest, at the end
+    ],
+)
+def test_killed_while_a_file_is_written_it_leaves_no_half_of_it(
+    whole: Whole, tmp_path: Path, how: str, number: int, kept: int
+) -> None:
+    out = tmp_path / "out"
+    process = begin(dying, out, whole.plan, HOW=how, NUMBER=str(number))
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == -signal.SIGKILL, errors
+    assert parts_in(out) == list(range(kept))
+    assert_finished_chunks_are_whole(out, whole)
+    done = sweep(whole.plan, out)
+    assert done.made == CHUNKS - kept
+    assert_is_whole(out, whole)
+
+
+@pytest.mark.parametrize(
+    ("number", "times", "processes"), [(signal.SIGINT, 3, 2), (signal.SIGTERM, 1, 1)]
+)
+def test_interrupted_it_says_that_the_same_command_goes_on(
+    whole: Whole, tmp_path: Path, number: int, times: int, processes: int
+) -> None:
+    """Also to who presses the keys again and again."""
+    out = tmp_path / "out"
+    process = begin(noting, out, whole.plan, processes)
+    wait_for_parts(process, out, 1)
+    family = processes_of(process.pid)
+    for _ in range(times):
+        process.send_signal(number)
+        time.sleep(0.03)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert output == ""
+    assert errors.splitlines() == [
+        f"flexspine: what is finished is in '{out}'; the same command goes on from it",
+        "flexspine: interrupted",
+    ]
+    assert_all_leave(family)
+    kept = parts_in(out)
+    assert kept
+    assert_finished_chunks_are_whole(out, whole)
+    done = sweep(whole.plan, out)
+    assert done.made == CHUNKS - len(kept)
+    assert_is_whole(out, whole)
+
+
+def test_a_worker_that_is_killed_is_replaced(whole: Whole, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = begin(noting, out, whole.plan, 2)
+    wait_for_parts(process, out, 1)
+    workers = [
+        number
+        for number in processes_of(process.pid)[1:]
+        if b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes()
+    ]
+    assert len(workers) == 2
+    os.kill(workers[0], signal.SIGKILL)
+    output, errors = process.communicate(timeout=120)
+    assert (process.returncode, errors) == (0, "")
+    record = json.loads(output)
+    assert (record["made"], record["digest"]) == (CHUNKS, whole.done.digest)
+    assert_is_whole(out, whole)
+
+
+# A full disk.
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 128 kB, or a skipped test where mounting is not allowed."""
+    disk, mount = tmp_path / "disk", shutil.which("mount")
+    disk.mkdir()
+    if mount is None:
+        pytest.skip("no mount")
+    command = [mount, "-t", "tmpfs", "-o", "size=128k", "flexspine-test", disk]
+    if subprocess.run(command, capture_output=True).returncode:
+        pytest.skip("mounting is not allowed")
+    try:
+        yield disk
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_a_full_disk_ends_it_and_keeps_what_is_finished(
+    whole: Whole, small_disk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, filler = small_disk / "out", small_disk / "filler"
+    filler.write_bytes(bytes(80_000))
+    command = ["sweep", str(whole.plan), "--out", str(out), "--processes", "1"]
+    for _ in range(2):
+        assert app.run(command) == 3
+        output, errors = capsys.readouterr()
+        assert output == ""
+        assert errors.startswith("flexspine: ")
+        assert errors.count("\n") == 1
+        assert "No space left on device" in errors
+        assert str(out) in errors
+        assert "free some space" in errors
+        assert 0 < len(parts_in(out)) < CHUNKS
+        assert_finished_chunks_are_whole(out, whole)
+        assert list(out.rglob(".partial*")) == []
+    filler.unlink()
+    assert app.run([*command, "--json"]) == 0
+    output, errors = capsys.readouterr()
+    assert json.loads(output)["made"] < CHUNKS
+    assert errors == ""
+    assert_is_whole(out, whole)
+
+
+@pytest.mark.parametrize(
+    ("write", "finished"),
+    [(1, []), (2, []), (6, [0, 1, 2, 3]), (14, list(range(CHUNKS)))],
+)
+def test_no_space_at_any_write_leaves_no_partial_file(
+    whole: Whole,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    write: int,
+    finished: list[int],
+) -> None:
+    out, writes = tmp_path / "out", iter(range(1, 100))
+
+    def full(_file: int) -> None:
+        if next(writes) == write:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    command = ["sweep", str(whole.plan), "--out", str(out), "--processes", "1", "--json"]
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        assert app.run(command) == 3
+    told = json.loads(capsys.readouterr().out)
+    assert told["error"] == "environment"
+    assert "No space left on device" in told["message"]
+    assert out.name in told["message"]
+    assert parts_in(out) == finished
+    assert list(out.rglob(".*")) == []
+    if write == 1:
+        assert not out.exists()
+    assert app.run(command) == 0
+    assert json.loads(capsys.readouterr().out)["made"] == CHUNKS - len(finished)
+    assert_is_whole(out, whole)
+
+
+# Two at once.
+
+
+def test_another_process_at_work_is_not_disturbed(
+    whole: Whole, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    first = begin(noting, out, whole.plan)
+    wait_for_parts(first, out, 1)
+    assert app.run(["sweep", str(whole.plan), "--out", str(out)]) == 2
+    output, errors = capsys.readouterr()
+    assert output == ""
+    assert errors.startswith(f"flexspine: another process is at work in '{out}'; wait for it")
+    output, errors = first.communicate(timeout=120)
+    assert (first.returncode, errors) == (0, "")
+    assert json.loads(output)["made"] == CHUNKS
+    assert_is_whole(out, whole)
+
+
+def test_a_lock_that_was_left_behind_keeps_nobody_out(whole: Whole, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with Store(out, read_plan(whole.plan)).opened():
+        locks = [path for path in out.iterdir() if path.name != "manifest.json"]
+        assert len(locks) == 1
+    locks[0].touch()  # whoever had it was killed
+    assert sweep(whole.plan, out).made == CHUNKS
+    assert_is_whole(out, whole)
+
+
+def test_two_that_wait_for_a_third_do_not_both_begin(
+    whole: Whole, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first ends between the moment the second opens the lock and that it takes it."""
+    out, plan = tmp_path / "out", read_plan(whole.plan)
+    first = Store(out, plan).opened()
+    first.__enter__()
+    lock = fcntl.flock
+    ends = iter([lambda: first.__exit__(None, None, None)])
+
+    def slowly(file: Any, how: int) -> None:
+        next(ends, lambda: None)()
+        lock(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", slowly)
+    with Store(out, plan).opened(), pytest.raises(OutputError, match="at work"):
+        Store(out, plan).opened().__enter__()
+
+
+# What is somebody else's.
+
+
+def test_somebody_elses_files_are_left_alone(whole: Whole, tmp_path: Path) -> None:
+    """Whatever they are called."""
+    other = tmp_path / "other"
+    (other / "deep").mkdir(parents=True)
+    names = (".lock", ".partial-mine", "deep/.partial-mine", "deep/part-000001.parquet")
+    for name in names:
+        (other / name).write_text("precious")
+    with pytest.raises(OutputError, match="something else"):
+        sweep(whole.plan, other)
+    assert {str(f.relative_to(other)) for f in other.rglob("*") if f.is_file()} == set(names)
+    assert {(other / name).read_text() for name in names} == {"precious"}
+
+
+@pytest.mark.parametrize("name", [".lock", ".partial-mine", ".hidden", "notes.txt", "rows"])
+def test_a_directory_with_anything_in_it_is_something_else(
+    whole: Whole, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / name).write_text("precious")
+    with pytest.raises(OutputError, match="something else"):
+        sweep(whole.plan, tmp_path / "other")
+    assert [path.name for path in (tmp_path / "other").iterdir()] == [name]
+    assert (tmp_path / "other" / name).read_text() == "precious"
+
+
+def test_notes_next_to_the_rows_do_no_harm(whole: Whole, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert sweep(whole.plan, out).made == CHUNKS
+    (out / "notes.txt").write_text("mine")
+    (out / "rows" / "model=scout2" / "part-000004.parquet").unlink()
+    assert sweep(whole.plan, out).made == 1
+    assert (out / "notes.txt").read_text() == "mine"
+    assert files_of(sweep(whole.plan, out)) == whole.files
+
+
+def test_what_made_the_rows_stays_on_record(whole: Whole, tmp_path: Path) -> None:
+    """Also where a later version finds nothing left to do."""
+    out = tmp_path / "out"
+    sweep(whole.plan, out)
+    manifest = json.loads((out / "manifest.json").read_text())
+    manifest["made_with"]["numpy"] = "1.0.0"
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    assert sweep(whole.plan, out).made == 0
+    assert json.loads((out / "manifest.json").read_text())["made_with"]["numpy"] == "1.0.0"
