@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from flexspine import InputError, Plan, examine, load_model, read_plan, save_gait
 from flexspine.parameters import values
+from flexspine.studies.axes import Axis
 
 FLEXIBLE, SCOUT = "kamimura2015-flexible", "scout2"
 
@@ -322,7 +323,8 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "steps without end": (HEAD + f"[axes]\nspeed = {{low = 4, high = 5, steps = {NUMBER}}}",
                           "give no more than"),
     "more steps than rows can count": (
-        HEAD + "[axes]\nspeed = {around = 0.1, steps = 100000}\nheight = {around = 0.1, steps = 100000}",
+        HEAD + "[axes]\nspeed = {around = 0.1, steps = 100000}\n"
+        "height = {around = 0.1, steps = 100000}",
         "too many"),
     "downwards": (HEAD + "[axes]\nspeed = {low = 5, high = 4, steps = 2}", "swap"),
     "low as text": (HEAD + '[axes]\nspeed = {low = "4", high = 5, steps = 2}', "low = '4'"),
@@ -400,9 +402,19 @@ def test_a_plan_made_in_python_is_checked_alike() -> None:
             Plan(**{"models": (model,), "axes": axes, **wrong})
 
 
-def read_axes(**content: Any) -> Any:
-    from flexspine.studies.axes import Axis
+def test_whole_numbers_and_numbers_of_numpy_are_numbers() -> None:
+    model = load_model(FLEXIBLE)
+    plain = Plan((model,), read_axes(speed={"low": 4.0, "high": 5.0, "steps": 2}))
+    other = Plan(
+        (model,),
+        (Axis("speed", low=4, high=np.float64(5), steps=2),),
+        options={"strides": np.int64(1)},
+    )
+    assert Plan.revive(other.record()).key == other.key
+    assert other.record()["axes"] == plain.record()["axes"]
 
+
+def read_axes(**content: Any) -> Any:
     return tuple(Axis.read(name, what) for name, what in content.items())
 
 

@@ -80,9 +80,11 @@ class Axis:
     def record(self) -> Any:
         """What a file would say of it."""
         if self.values:
-            return list(self.values)
-        names = ("low", "high", "around", "within", "steps", "keeps")
-        return {n: getattr(self, n) for n in names if getattr(self, n) is not None}
+            return list(map(float, self.values))
+        bounds = {n: getattr(self, n) for n in ("low", "high", "around", "within")}
+        record = {n: float(value) for n, value in bounds.items() if value is not None}
+        others = {"steps": self.steps, "keeps": self.keeps}
+        return record | {n: value for n, value in others.items() if value is not None}
 
     def range(self, own: float) -> tuple[float, float]:
         """Lowest and highest value for a model whose own is ``own``."""

@@ -146,7 +146,8 @@ class Plan:
             "axes": {axis.name: axis.record() for axis in self.axes},
             "models": [model_record(model) for model in self.models],
         }
-        return dict(json.loads(json.dumps(record)))
+        # NumPy's numbers become plain ones.
+        return dict(json.loads(json.dumps(record, default=lambda number: number.item())))
 
     @classmethod
     def revive(cls, record: Mapping[str, Any]) -> Plan:
@@ -296,7 +297,7 @@ def _check_options(plan: Plan) -> None:
     for name, value in plan.options.items():
         if name not in known:
             raise UnknownNameError(f"option of {plan.task}", name, known)
-        if known[name] is not float and not isinstance(value, known[name]):
+        if known[name] not in (int, float) and not isinstance(value, known[name]):
             raise ParameterError(
                 f"{name} = {shortened(value)} is not usable", f"see the task '{plan.task}'"
             )
