@@ -20,13 +20,16 @@ test: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks
 
-# The pictures of the README.
+# The pictures of the README and of docs/.
 pictures: $(VENV)/.installed
 	$(BIN)/flexspine bound --strides 2 --out $(OUT)/pictures
 	$(BIN)/flexspine study --out $(OUT)/pictures/study
+	$(BIN)/flexspine basin --out $(OUT)/pictures/basin
+	$(BIN)/flexspine map --out $(OUT)/pictures/map
 	mkdir -p docs/images
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
 	cp $(OUT)/pictures/study/peak_grf_over_speed.png docs/images/
+	cp $(OUT)/pictures/basin/basin.png $(OUT)/pictures/map/map.png docs/images/
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -26,15 +26,21 @@ if TYPE_CHECKING:
     from flexspine.models.presets import load_model, preset_names
     from flexspine.models.simulation import Run, simulate
     from flexspine.report.animation import animate, strip
+    from flexspine.report.basin_figure import plot_basin
     from flexspine.report.figure import plot_run
+    from flexspine.report.map_figure import plot_map
+    from flexspine.studies.basin import Basin, basin_plan, read_basins
+    from flexspine.studies.gait_map import GaitMap, map_plan, read_map
     from flexspine.studies.plan import Plan, read_plan
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
 
 _HOMES = {
+    "Basin": "studies.basin",
     "Branch": "gaits.continuation",
     "Ensemble": "models.many",
     "FlexspineError": "errors",
     "Gait": "gaits.gait",
+    "GaitMap": "studies.gait_map",
     "InputError": "errors",
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
@@ -47,13 +53,19 @@ _HOMES = {
     "Stability": "gaits.stability",
     "Sweep": "studies.sweep",
     "animate": "report.animation",
+    "basin_plan": "studies.basin",
     "examine": "gaits.gait",
     "find_gaits": "gaits.search",
     "floquet_multipliers": "gaits.stability",
     "load_gait": "gaits.files",
     "load_model": "models.presets",
+    "map_plan": "studies.gait_map",
+    "plot_basin": "report.basin_figure",
+    "plot_map": "report.map_figure",
     "plot_run": "report.figure",
     "preset_names": "models.presets",
+    "read_basins": "studies.basin",
+    "read_map": "studies.gait_map",
     "read_plan": "studies.plan",
     "rerun": "studies.sweep",
     "save_gait": "gaits.files",
@@ -70,10 +82,12 @@ _HOMES = {
 }
 
 __all__ = [
+    "Basin",
     "Branch",
     "Ensemble",
     "FlexspineError",
     "Gait",
+    "GaitMap",
     "InputError",
     "Landmark",
     "MachineError",
@@ -87,13 +101,19 @@ __all__ = [
     "Sweep",
     "__version__",
     "animate",
+    "basin_plan",
     "examine",
     "find_gaits",
     "floquet_multipliers",
     "load_gait",
     "load_model",
+    "map_plan",
+    "plot_basin",
+    "plot_map",
     "plot_run",
     "preset_names",
+    "read_basins",
+    "read_map",
     "read_plan",
     "rerun",
     "save_gait",

@@ -44,7 +44,7 @@ def drawn_map() -> GaitMap:
 
 @pytest.fixture(scope="module")
 def basins() -> list[Basin]:
-    """A stable gait, the third of whose starts goes elsewhere, and one about which all fall."""
+    """A stable gait, of whose starts a third does not come to it, and one about which all fall."""
     model = load_model("scout2")
     pitches, rates = np.linspace(-0.5, 0.5, 9), np.linspace(0.0, 4.0, 7)
     strides = np.full((9, 7), 100)
@@ -176,7 +176,7 @@ def test_a_basin_tells_its_numbers(basins: list[Basin]) -> None:
     assert "at rest" in told
     assert "at rest" not in words(plot_basin(basins[:1]))
     lost = replace(basins[0], others=(Other(dict(basins[0].model.apex), 21, None),))
-    assert "33.3 % elsewhere" in words(plot_basin([lost]))
+    assert "33.3 % not, or not yet" in words(plot_basin([lost]))
 
 
 def test_every_axis_has_a_unit(drawn_map: GaitMap, basins: list[Basin]) -> None:

@@ -210,8 +210,8 @@ def _report(basins: Sequence[Basin], done: Sweep) -> str:
     lines = [
         f"{done.rows} starts, {wanted} strides wanted, {done.strides} done in {done.seconds:.1f} s",
         "",
-        "     spectral              fell in the   lasted  came to  elsewhere",
-        "       radius    starts   first stride      all   the gait",
+        "     spectral              fell in the   lasted  came to    not, or",
+        "       radius    starts   first stride      all   the gait    not yet",
     ]
     for basin in basins:
         row = basin.row()

@@ -184,7 +184,7 @@ def _count(basin: Basin) -> str:
     if not row["elsewhere"]:
         return f"{come} of {row['starts']} come to it"
     gaits = all(other.radius is not None for other in basin.others)
-    return f"{come} come to it,\n{go} {'to other gaits' if gaits else 'elsewhere'}"
+    return f"{come} come to it,\n{go} {'to other gaits' if gaits else 'not, or not yet'}"
 
 
 def _details(basin: Basin) -> list[str]:

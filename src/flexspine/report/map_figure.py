@@ -178,8 +178,8 @@ def _widened(content: Array) -> Array:
 def _draw_lines(axes: Axes, found: GaitMap, marks: Sequence[float]) -> None:
     """Draw where gaits end and where they turn stable, and mark stiffnesses."""
     limits = (found.speeds[0], found.speeds[-1])
-    for ends, bound in zip(_bounds(found), limits, strict=True):
-        axes.plot(*_outline(ends, found.stiffnesses, bound), **EDGE)
+    for ends in (found.slowest, found.fastest):
+        axes.plot(ends, found.stiffnesses, **EDGE)
     if 0 < found.stable < found.found:
         shown = np.ma.masked_invalid(found.radius)
         axes.contour(
@@ -193,18 +193,6 @@ def _draw_lines(axes: Axes, found: GaitMap, marks: Sequence[float]) -> None:
     axes.set_ylim(found.stiffnesses[0], found.stiffnesses[-1])
 
 
-def _outline(ends: Array, stiffnesses: Array, bound: float) -> tuple[list[float], list[float]]:
-    """The line along the ends, with a step half way to a line on which the map ends before."""
-    points = [(ends[0], stiffnesses[0])]
-    for i in range(1, len(ends)):
-        if np.isinf(ends[i - 1]) != np.isinf(ends[i]):
-            middle = (stiffnesses[i - 1] + stiffnesses[i]) / 2
-            points += [(end if np.isfinite(end) else bound, middle) for end in ends[i - 1 : i + 1]]
-        points.append((ends[i], stiffnesses[i]))
-    speeds, heights = zip(*points, strict=True)
-    return list(np.where(np.isfinite(speeds), speeds, np.nan)), list(heights)
-
-
 def _details(found: GaitMap) -> list[str]:
     """What all gaits share, and how stable the most stable of them is."""
     given = values(found.model.parameters)
@@ -216,6 +204,7 @@ def _details(found: GaitMap) -> list[str]:
         f"total energy {found.energy:.4g} J",
         f"apex height {found.height:.4g} m",
         *of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair"),
+        "followed over speed, stiffness by stiffness",
         "peak: of fore or hind legs, whichever is larger",
         f"{stable}least spectral radius {found.radius[i, j]:.3g}, at {where}",
     ]
