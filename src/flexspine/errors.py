@@ -17,7 +17,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import ClassVar
+from typing import Any, ClassVar
 
 # What the system says of a full disk: the machine's failure, not the caller's.
 OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
@@ -34,8 +34,18 @@ class FlexspineError(Exception):
         self.message = message
         self.remedy = remedy
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Subclasses are made of other things; between processes only what is told counts.
+        return _again, (type(self), self.message, self.remedy), self.__dict__
+
     def __str__(self) -> str:
         return f"{self.message}; {self.remedy}"
+
+
+def _again(kind: type[FlexspineError], message: str, remedy: str) -> FlexspineError:
+    error = kind.__new__(kind, message, remedy)
+    FlexspineError.__init__(error, message, remedy)
+    return error
 
 
 class InputError(FlexspineError):

@@ -24,8 +24,7 @@ import pytest
 import flexspine
 from flexspine.errors import InputError, MachineError
 from flexspine.workers import cluster
-from flexspine.workers.cluster import DaskWorkers
-from flexspine.workers.local import AHEAD
+from flexspine.workers.cluster import AHEAD, DaskWorkers
 
 ROOT = Path(__file__).parents[2]
 

@@ -19,7 +19,9 @@ from uuid import uuid4
 from flexspine._version import __version__
 from flexspine.errors import InputError, MachineError
 from flexspine.workers.crew import Result, Work
-from flexspine.workers.local import AHEAD
+
+# Pieces under way per thread: one being done and one waiting, so that none idles.
+AHEAD = 2
 
 ADDRESS = re.compile(r"(tcp|tls)://([^\s:/@\[\]]+|\[[0-9a-fA-F:.]+\]):[1-9][0-9]{0,4}")
 
