@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexspine import load_model
-from flexspine.hybrid.ensemble import Starts, run_many
+from flexspine.hybrid.batch import Starts
+from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.lanes import compile_lanes
 from flexspine.hybrid.trajectory import HybridState, Trajectory

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from flexspine.report.map_figure import plot_map
     from flexspine.studies.basin import Basin, basin_plan, read_basins
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
-    from flexspine.studies.plan import Plan, read_plan
+    from flexspine.studies.plan import Plan
+    from flexspine.studies.plan_file import read_plan
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
 
 _HOMES = {
@@ -66,7 +67,7 @@ _HOMES = {
     "preset_names": "models.presets",
     "read_basins": "studies.basin",
     "read_map": "studies.gait_map",
-    "read_plan": "studies.plan",
+    "read_plan": "studies.plan_file",
     "rerun": "studies.sweep",
     "save_gait": "gaits.files",
     "simulate": "models.simulation",

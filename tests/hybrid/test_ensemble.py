@@ -10,8 +10,9 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from flexspine import Model, load_model
+from flexspine.hybrid.batch import Ends, Starts
 from flexspine.hybrid.compile import BoundSystem, compile_system
-from flexspine.hybrid.ensemble import Ends, Starts, run_many
+from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.integrate import SECTION_TIMEOUT, integrate
 from flexspine.hybrid.lanes import compile_lanes

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.hybrid.batch import Ends, Starts
 from flexspine.hybrid.compile import Array, compile_system
-from flexspine.hybrid.ensemble import Ends, Starts, run_many
+from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.lanes import compile_lanes
 from flexspine.models.legs import SIDES

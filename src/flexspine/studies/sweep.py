@@ -11,7 +11,8 @@ from typing import Any
 from flexspine.errors import InputError
 from flexspine.models.simulation import check_count
 from flexspine.studies.parts import digest_of
-from flexspine.studies.plan import Plan, read_plan
+from flexspine.studies.plan import Plan
+from flexspine.studies.plan_file import read_plan
 from flexspine.studies.store import Store, made_with, read_manifest, read_plan_of
 from flexspine.studies.tasks import do_chunk
 from flexspine.workers.crew import Crew
