@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from flexspine.models.many import Ensemble, simulate_many, stream_many
     from flexspine.models.model import Model
     from flexspine.models.presets import load_model, preset_names
+    from flexspine.models.robot import Robot
+    from flexspine.models.robot_file import load_robot, robot_names
     from flexspine.models.simulation import Run, simulate
     from flexspine.report.animation import animate, strip
     from flexspine.report.basin_figure import plot_basin
@@ -49,6 +51,7 @@ _HOMES = {
     "Plan": "studies.plan",
     "Rerun": "studies.sweep",
     "ReturnMap": "gaits.return_map",
+    "Robot": "models.robot",
     "Run": "models.simulation",
     "Search": "gaits.search",
     "Stability": "gaits.stability",
@@ -60,6 +63,7 @@ _HOMES = {
     "floquet_multipliers": "gaits.stability",
     "load_gait": "gaits.files",
     "load_model": "models.presets",
+    "load_robot": "models.robot_file",
     "map_plan": "studies.gait_map",
     "plot_basin": "report.basin_figure",
     "plot_map": "report.map_figure",
@@ -69,6 +73,7 @@ _HOMES = {
     "read_map": "studies.gait_map",
     "read_plan": "studies.plan_file",
     "rerun": "studies.sweep",
+    "robot_names": "models.robot_file",
     "save_gait": "gaits.files",
     "simulate": "models.simulation",
     "simulate_many": "models.many",
@@ -96,6 +101,7 @@ __all__ = [
     "Plan",
     "Rerun",
     "ReturnMap",
+    "Robot",
     "Run",
     "Search",
     "Stability",
@@ -108,6 +114,7 @@ __all__ = [
     "floquet_multipliers",
     "load_gait",
     "load_model",
+    "load_robot",
     "map_plan",
     "plot_basin",
     "plot_map",
@@ -117,6 +124,7 @@ __all__ = [
     "read_map",
     "read_plan",
     "rerun",
+    "robot_names",
     "save_gait",
     "simulate",
     "simulate_many",

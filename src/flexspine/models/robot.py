@@ -1,0 +1,137 @@
+"""Planar robots: a linkage made from a description, with its numbers by dotted name.
+
+A description (TOML) has tables ``links``, ``joints`` and ``feet``; `flexspine.robots` has those
+that come with flexspine. The first link is free, every other one has a parent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from flexspine.errors import InputError, ParameterError, UnknownNameError
+from flexspine.mechanics.linkage import Foot, Joint, Link, Linkage
+from flexspine.models.model import Source
+from flexspine.parameters import ParameterSet, build, quantity, values
+
+
+class LinkNumbers(ParameterSet):
+    """What a link measures."""
+
+    length: float = quantity("m", "from its start to its end", above=0, upper=1e3)
+    mass: float = quantity("kg", "of the link", above=0, upper=1e6)
+    com: float = quantity("m", "its centre of mass, from its start", at_least=-1e3, upper=1e3)
+    inertia: float = quantity("kg m^2", "about its centre of mass", at_least=0, upper=1e9)
+    at: float = quantity(
+        "m", "where it starts, from the start of its parent", at_least=-1e3, upper=1e3, default=0.0
+    )
+
+
+class JointNumbers(ParameterSet):
+    """The spring-damper of a joint."""
+
+    stiffness: float = quantity(
+        "N m/rad", "on the relative angle", at_least=0, upper=1e9, default=0.0
+    )
+    damping: float = quantity("N m s/rad", "on its rate", at_least=0, upper=1e9, default=0.0)
+    rest: float = quantity(
+        "rad", "where the spring is at rest", at_least=-10, upper=10, default=0.0
+    )
+
+
+class FootNumbers(ParameterSet):
+    """A foot."""
+
+    at: float = quantity("m", "from the start of its link", at_least=-1e3, upper=1e3)
+    mass: float = quantity("kg", "of the foot, a point", at_least=0, upper=1e6, default=0.0)
+
+
+class GroundNumbers(ParameterSet):
+    """What the robot stands on and falls to."""
+
+    gravity: float = quantity("m/s^2", "downwards", at_least=0, upper=1e3, default=9.81)
+    friction: float = quantity(
+        "1", "of feet on the ground (Coulomb)", at_least=0, upper=10, default=0.8
+    )
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A planar robot: what hangs on what, and its numbers.
+
+    ``parents`` by link, in the order of the coordinates; the first has none. ``joints`` by name:
+    link and whether it has a motor. ``feet`` by name: link. ``numbers`` by dotted name, such as
+    ``spine.stiffness``, in SI units and radians.
+    """
+
+    name: str
+    parents: Mapping[str, str | None]
+    joints: Mapping[str, tuple[str, bool]]
+    feet: Mapping[str, str]
+    numbers: Mapping[str, float]
+    source: Source
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """The mechanism."""
+        return Linkage(
+            tuple(
+                Link(name=name, parent=parent, **self._of(name, LinkNumbers))
+                for name, parent in self.parents.items()
+            ),
+            tuple(
+                Joint(name=name, link=link, actuated=motor, **self._of(name, JointNumbers))
+                for name, (link, motor) in self.joints.items()
+            ),
+            tuple(
+                Foot(name=name, link=link, **self._of(name, FootNumbers))
+                for name, link in self.feet.items()
+            ),
+            self.numbers["gravity"],
+        )
+
+    @property
+    def friction(self) -> float:
+        """The coefficient of Coulomb friction of feet on the ground."""
+        return self.numbers["friction"]
+
+    def with_values(self, changes: Mapping[str, Any], origin: str = "set by user") -> Robot:
+        """Return the same robot with some numbers changed, by dotted name.
+
+        Raises `UnknownNameError` and `ParameterError`.
+        """
+        for name in changes:
+            if name not in self.numbers:
+                raise UnknownNameError("parameter", name, self.numbers)
+        numbers = checked(self.parents, self.joints, self.feet, {**self.numbers, **changes})
+        provenance = {**self.source.provenance, **dict.fromkeys(changes, origin)}
+        return replace(self, numbers=numbers, source=replace(self.source, provenance=provenance))
+
+    def _of(self, name: str, kind: type[ParameterSet]) -> dict[str, float]:
+        return {field: self.numbers[f"{name}.{field}"] for field in kind.model_fields}
+
+
+def checked(
+    parents: Mapping[str, Any],
+    joints: Mapping[str, Any],
+    feet: Mapping[str, Any],
+    numbers: Mapping[str, Any],
+) -> dict[str, float]:
+    """All numbers by dotted name, defaults filled in. Raises `ParameterError`."""
+    kinds: dict[str, type[ParameterSet]] = dict.fromkeys(parents, LinkNumbers)
+    kinds |= dict.fromkeys(joints, JointNumbers) | dict.fromkeys(feet, FootNumbers)
+    ground = {name: value for name, value in numbers.items() if "." not in name}
+    found = values(build(GroundNumbers, ground))
+    for part, kind in kinds.items():
+        own = {
+            name.removeprefix(f"{part}."): value
+            for name, value in numbers.items()
+            if name.startswith(f"{part}.")
+        }
+        try:
+            found |= values(build(kind, own), f"{part}.")
+        except InputError as failure:
+            raise ParameterError(f"{part}: {failure.message}", failure.remedy) from None
+    return found

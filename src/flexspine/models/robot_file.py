@@ -1,0 +1,201 @@
+"""Descriptions of planar robots, TOML files, and those that come with flexspine."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from flexspine.errors import InputError, PresetError, UnknownNameError
+from flexspine.models.model import Source
+from flexspine.models.robot import Robot, checked
+
+TABLES = ("links", "joints", "feet")
+TEXTS = ("title", "citation", "source")
+LISTS = ("notes", "doubts")
+GROUND = ("gravity", "friction")
+
+# What the entries of the tables are, besides numbers.
+WORDS = {"links": ("parent",), "joints": ("link", "actuated"), "feet": ("link",)}
+
+
+def robot_names() -> list[str]:
+    """Return the names of the robots that come with flexspine."""
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in (files("flexspine") / "robots").iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def load_robot(robot: str | Path, parameters: Mapping[str, Any] | None = None) -> Robot:
+    """Load a robot by name, or its description by the path of a TOML file.
+
+    ``parameters`` are numbers to change, by dotted name (``{"spine.stiffness": 300}``); SI and
+    radians. Raises `UnknownNameError`, `PresetError` and `ParameterError`.
+    """
+    name = str(robot)
+    try:
+        made = _robot(Path(name).stem, _parsed(_read(name)), f"file {name}")
+    except UnknownNameError:
+        raise
+    except InputError as failure:
+        raise PresetError(f"'{name}': {failure.message}", failure.remedy) from None
+    return made.with_values(parameters) if parameters else made
+
+
+def _read(name: str) -> str:
+    if name in robot_names():
+        return (files("flexspine") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
+    path = Path(name)
+    try:
+        if path.suffix != ".toml" and not path.exists():
+            raise UnknownNameError("robot", name, robot_names())
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as failure:
+        raise InputError(f"cannot be read ({failure.strerror})", "give a TOML file") from None
+    except ValueError:
+        raise InputError("is not text", "give a TOML file in UTF-8") from None
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    try:
+        content = tomllib.loads(text)
+    except (ValueError, RecursionError) as failure:
+        raise InputError(f"not valid TOML: {failure}", "mend that line") from None
+    known = (*TABLES, *TEXTS, *LISTS, *GROUND)
+    for entry in content:
+        if entry not in known:
+            raise InputError(f"unknown entry '{entry}'", f"known: {', '.join(known)}")
+    for entry in TEXTS:
+        if not isinstance(content.get(entry, ""), str):
+            raise InputError(f"'{entry}' is no text", "put it in quotes")
+    for entry in LISTS:
+        texts = content.get(entry, [])
+        if not (isinstance(texts, list) and all(isinstance(text, str) for text in texts)):
+            raise InputError(f"'{entry}' is not a list of texts", f'write {entry} = ["..."]')
+    return content
+
+
+def _table(content: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = content.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"'{name}' is not a table", f"write [{name}.NAME]")
+    for part, entries in table.items():
+        if not isinstance(entries, Mapping):
+            raise InputError(f"{name}.{part} is not a table", f"write [{name}.{part}]")
+    return table
+
+
+def _robot(name: str, content: Mapping[str, Any], origin: str) -> Robot:
+    links, joints, feet = (_table(content, table) for table in TABLES)
+    _check_names(links, joints, feet)
+    parents = {link: part.get("parent") for link, part in links.items()}
+    _check_tree(parents)
+    for table, parts in (("joints", joints), ("feet", feet)):
+        for part, entries in parts.items():
+            _check_link(f"{table}.{part}", entries.get("link"), links)
+    _check_joints(joints, parents)
+    numbers = {entry: content[entry] for entry in GROUND if entry in content}
+    for table, parts in zip(TABLES, (links, joints, feet), strict=True):
+        for part, entries in parts.items():
+            numbers |= {f"{part}.{k}": v for k, v in entries.items() if k not in WORDS[table]}
+    # Without a word a link starts at the end of its parent, and a foot is at the end of its link.
+    for link, parent in parents.items():
+        if parent is not None:
+            numbers.setdefault(f"{link}.at", links[parent].get("length"))
+    for foot, entries in feet.items():
+        numbers.setdefault(f"{foot}.at", links[entries["link"]].get("length"))
+    wired = {j: (part["link"], part.get("actuated", False)) for j, part in joints.items()}
+    standing = {foot: part["link"] for foot, part in feet.items()}
+    return Robot(
+        name=name,
+        parents=parents,
+        joints=wired,
+        feet=standing,
+        numbers=checked(parents, wired, standing, numbers),
+        source=Source(
+            title=str(content.get("title", name)),
+            citation=str(content.get("citation", "")),
+            source=str(content.get("source", origin)),
+            notes=tuple(content.get("notes", ())),
+            doubts=tuple(content.get("doubts", ())),
+        ),
+    )
+
+
+def _check_names(*tables: Mapping[str, Any]) -> None:
+    links, _, feet = tables
+    if not links:
+        raise InputError("there are no links", "add [links.NAME] tables")
+    if not feet:
+        raise InputError("there are no feet", "add a [feet.NAME] table with the link that it is on")
+    names = [name for table in tables for name in table]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"two parts are named '{name}'", "name links, joints, feet differently"
+            )
+        if "." in name:
+            raise InputError(f"'{name}' has a dot in its name", "use an underscore")
+
+
+def _check_tree(parents: Mapping[str, Any]) -> None:
+    """One free link, and every other one after its parent."""
+    for link, parent in parents.items():
+        if parent is not None:
+            _check_link(f"links.{link}", parent, parents, "parent")
+    for link in parents:
+        walk = [link]
+        while (above := parents[walk[-1]]) is not None:
+            walk.append(above)
+            if above in walk[:-1]:
+                loop = " -> ".join(walk[walk.index(above) :])
+                raise InputError(
+                    f"links.{link}: {loop} is a loop", "let one of them have no parent"
+                )
+    free = [link for link, parent in parents.items() if parent is None]
+    if len(free) > 1:
+        raise InputError(
+            f"links.{free[1]} has no parent, and neither has {free[0]}",
+            f"give links.{free[1]} a parent",
+        )
+    seen: set[str] = set()
+    for link, parent in parents.items():
+        if parent is not None and parent not in seen:
+            raise InputError(f"links.{link} comes before its parent '{parent}'", "move it below")
+        seen.add(link)
+
+
+def _check_link(where: str, name: Any, links: Mapping[str, Any], entry: str = "link") -> None:
+    if name is None:
+        raise InputError(f"{where} names no link", f'add {entry} = "LINK"')
+    if not isinstance(name, str):
+        raise InputError(f"{where}: {entry} = {name!r} is no name", "give the name of a link")
+    if name not in links:
+        unknown = UnknownNameError("link", name, links)
+        raise InputError(f"{where}: {unknown.message}", unknown.remedy)
+
+
+def _check_joints(joints: Mapping[str, Any], parents: Mapping[str, Any]) -> None:
+    taken: dict[str, str] = {}
+    for joint, entries in joints.items():
+        link = entries["link"]
+        if parents[link] is None:
+            raise InputError(
+                f"joints.{joint}: link '{link}' has no parent to be joined to",
+                "name the link on the far side of the joint",
+            )
+        if link in taken:
+            raise InputError(
+                f"joints.{joint}: link '{link}' already has the joint '{taken[link]}'",
+                "keep one of them",
+            )
+        taken[link] = joint
+        if not isinstance(entries.get("actuated", False), bool):
+            raise InputError(
+                f"joints.{joint}: actuated = {entries['actuated']!r} is neither true nor false",
+                "write actuated = true",
+            )
