@@ -354,6 +354,11 @@ def test_an_unfinished_sweep_is_repeated_as_far_as_it_got(
 ) -> None:
     for model, number in (("scout2", 1), ("kamimura2015-flexible", 0)):
         part(copied, number, model).unlink()
+    assert run("rerun", "out", "--processes", "1") == 1
+    assert "0 of 4 chunks differ, 2 are missing" in capsys.readouterr().out
+    manifest = json.loads((copied / "manifest.json").read_text())
+    del manifest["finished"]
+    (copied / "manifest.json").write_text(json.dumps(manifest))
     assert run("rerun", "out", "--processes", "1") == 0
     assert capsys.readouterr().out == "the same: all 4 chunks\n"
     with_one_value_changed(part(copied, 2))
@@ -483,3 +488,47 @@ def test_a_sweep_without_a_finished_chunk_cannot_be_repeated(
     shutil.rmtree(copied / "rows")
     assert run("rerun", "out") == 2
     assert_one_clear_line(capsys, "'out'", "no finished chunk")
+
+
+def test_files_that_are_not_of_a_sweep_are_named(
+    run: Run, copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whoever reads the rows would read them as well."""
+    stray = part(copied, 9)
+    shutil.copy(part(copied, 1), stray)
+    for words in (("rerun", "out"), ("sweep", "plan.toml", "--out", "out")):
+        assert run(*words, "--processes", "1") == 2
+        assert_one_clear_line(capsys, str(stray.relative_to(copied)), "not of this sweep")
+
+
+HOPELESS = {
+    "too many to fix": (
+        'task = "searches"\n[options]\nfixed = {energy=230, height=0.35, pitch_rate=3}\n'
+        "[axes]\nmean_speed = [3.0]",
+        2, "1 too many to fix",
+    ),
+    "too few fixed": (
+        'task = "searches"\n[options]\nfixed = {energy=200}\n[axes]\nmean_speed = [3.0]',
+        2, "families",
+    ),
+    "no gait to follow": (
+        'task = "gaits"\n[set]\nheight = 0.3\n[axes]\nmean_speed = [3.0, 3.1]',
+        2, "no gait to follow",
+    ),
+    "none found": (
+        'task = "searches"\n[options]\nstarts = 1\nfixed = {energy=230, height=0.05}\n'
+        "[axes]\nmean_speed = [3.0]",
+        1, "1 none",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", HOPELESS)
+def test_searches_and_gaits_that_lead_nowhere_do_not_end_well(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str], case: str
+) -> None:
+    text, code, told = HOPELESS[case]
+    (tmp_path / "plan.toml").write_text(f'model = "scout2"\n{text}')
+    assert run("sweep", "plan.toml", "--out", "out", "--processes", "1") == code
+    assert told in "".join(capsys.readouterr())
+    assert (tmp_path / "out").exists() == (code == 1)

@@ -95,6 +95,19 @@ def test_values_that_make_no_runs_are_refused(flexible: Model, given: dict[str, 
     assert "\n" not in str(caught.value)
 
 
+def test_what_is_no_model_and_no_mapping_is_refused(flexible: Model) -> None:
+    with pytest.raises(InputError, match="is no model"):
+        simulate_many("scout2")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="does not tell what varies"):
+        simulate_many(flexible, [0.3, 0.31])  # type: ignore[arg-type]
+    runs = simulate_many(flexible, {"height": [0.32, 0.33]})
+    assert repr(runs).startswith("<Ensemble of 2 runs of kamimura2015-flexible")
+    with pytest.raises(InputError, match="did you mean 'outcome'"):
+        runs["outcomes"]
+    with pytest.raises(InputError, match="no run 2"):
+        runs.run(2)
+
+
 def test_the_tally_counts_every_run() -> None:
     model = load_model("scout2")
     many = simulate_many(model, scattered(model), strides=2)

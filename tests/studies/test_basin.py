@@ -124,8 +124,8 @@ def test_the_basin_of_the_stable_gait_is_wide_and_no_other_gait_has_one(
     assert stable.settled[inner].all()
     assert not any(basin.lasted.any() for basin in others)
     row = stable.row()
-    assert row["lasted"] == row["settled"] + row["elsewhere"]
-    assert row["elsewhere"] == sum(other.starts for other in stable.others)
+    assert row["lasted"] == row["settled"] + row["not_settled"]
+    assert row["not_settled"] == sum(other.starts for other in stable.others)
     for other in stable.others:
         run = simulate(stable.model.with_values(apex=other.apex), strides=1)
         assert run.apexes[-1] == pytest.approx(other.apex, abs=1e-8)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexspine import load_model, rerun, sweep
-from flexspine.errors import InputError, ParameterError, UnknownNameError
+from flexspine.errors import InputError, ParameterError
 from flexspine.gaits.gait import examine
 from flexspine.studies.gait_map import GaitMap, map_plan, read_map
 from tests.conftest import reference_rows
@@ -111,7 +111,7 @@ def test_what_is_no_map_is_refused() -> None:
         map_plan(gait, lines=1)
     with pytest.raises(ParameterError, match="no gait"):
         map_plan(examine(load_model("scout2", apex={"height": 0.36})))
-    with pytest.raises(UnknownNameError, match="spine"):
+    with pytest.raises(InputError, match="spine"):
         map_plan(examine(load_model("scout2")))
 
 

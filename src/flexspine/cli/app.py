@@ -29,6 +29,14 @@ from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineEr
 
 INTERRUPTED = 130
 
+
+class InterruptionError(FlexspineError):
+    """Somebody, or the system, ended the command."""
+
+    code = "interrupted"
+    exit_code = INTERRUPTED
+
+
 # Typer has carried its own click since 0.26 and used the installed one before.
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
@@ -90,6 +98,8 @@ def run(arguments: list[str]) -> int:
         code = 0  # the reader of our output went away; Typer leaves like this then
     if code == INTERRUPTED:
         print("flexspine: interrupted", file=sys.stderr)
+        if as_json:
+            fail(InterruptionError("interrupted", "run it again"), as_json)
     return code if isinstance(code, int) else 0
 
 

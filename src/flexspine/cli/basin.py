@@ -50,7 +50,8 @@ def basin(
         typer.Option(
             metavar="NAME:AMOUNT",
             help="An apex coordinate to vary and how far each way, e.g. height:0.1; give two "
-            "(default pitch:0.8 and pitch_rate:8).",
+            "(default pitch:0.8 and pitch_rate:8, or fore_pitch:0.3 and hind_pitch:0.3 of a body "
+            "that bends).",
         ),
     ] = None,
     points: Annotated[int | None, typer.Option(min=2, help="Values of each (default 100).")] = None,
@@ -218,6 +219,6 @@ def _report(basins: Sequence[Basin], done: Sweep) -> str:
         lines.append(
             f"{row['level_spectral_radius']:13.4f}{row['starts']:10}"
             f"{row['fell_in_the_first_stride']:15}{row['lasted']:9}{row['settled']:11}"
-            f"{row['elsewhere']:11}  {basin.name}"
+            f"{row['not_settled']:11}  {basin.name}"
         )
     return "\n".join(lines)

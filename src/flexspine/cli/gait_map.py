@@ -93,6 +93,8 @@ def _record(found: GaitMap, done: Sweep) -> dict[str, Any]:
         "schema_version": SCHEMA_VERSION,
         "flexspine": __version__,
         "preset": found.model.name,
+        "apex": dict(found.model.apex),
+        "touchdown_angles": dict(found.model.touchdown),
         "energy": found.energy,
         "height": found.height,
         "points": done.rows,

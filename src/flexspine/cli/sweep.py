@@ -42,27 +42,31 @@ def sweep(
 
     The file names models and axes, a task (runs, searches, gaits) and its options. Rows land in
     Parquet files in DIR/rows, a chunk at a time. Interrupted or killed, the same command goes on.
-    Exit code 0: done; 2: bad input; 3: the machine or its workers failed; 130: interrupted.
+    Exit code 0: done; 1: searches or gaits of which none was found; 2: bad input; 3: the machine or
+    its workers failed; 130: interrupted.
 
     Examples:
         flexspine sweep examples/million_strides.toml --out results/million
 
         flexspine sweep FILE.toml --out DIR --scheduler tcp://node1:8786
     """
+    from flexspine.studies.plan import RUNS
     from flexspine.studies.sweep import sweep as carry_out
+    from flexspine.studies.tasks import FOUND
 
     with unfinished_is_kept(out), counting("points") as progress:
         done = carry_out(
             plan, out, processes=count_of(processes), client=scheduler, progress=progress
         )
+    code = 0 if done.plan.task == RUNS or done.outcomes.get(FOUND) else 1
     if json:
         print_json(_record(done))
-        return 0
+        return code
     counts = ", ".join(f"{count} {name}" for name, count in done.outcomes.items())
     strides = f", {done.strides} strides" if done.strides else ""
     print(f"{done.rows} rows ({counts}){strides} in {done.seconds:.1f} s")
     print(f"rows in {out / 'rows'}")
-    return 0
+    return code
 
 
 def rerun(
@@ -94,13 +98,15 @@ def rerun(
                 "same": found.same,
                 "chunks": found.chunks,
                 "differing": list(found.differing),
+                "missing": list(found.missing),
                 "changed": {n: {"was": b, "is": a} for n, (b, a) in found.changed.items()},
             }
         )
     elif found.same:
         print(f"the same: all {found.chunks} chunks")
     else:
-        print(f"not the same: {len(found.differing)} of {found.chunks} chunks differ")
+        lost = f", {len(found.missing)} are missing" if found.missing else ""
+        print(f"not the same: {len(found.differing)} of {found.chunks} chunks differ{lost}")
         for file in found.differing.values():
             print(f"  {file}")
         for name, (before, now) in found.changed.items():

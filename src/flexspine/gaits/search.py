@@ -99,24 +99,43 @@ def find_gaits(
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
     ranges = {**(bounds or {}), **(free or {})}
     _check_request(model, free or {}, starts, seed)
-    kinds = [symmetric] if symmetric is not None else [True, False]
-    if symmetric is None and not _symmetry_allows(model, {*wanted, *ranges}):
-        kinds = [False]
+    problems = pose_problems(
+        model, wanted, free=free, symmetric=symmetric, bounds=bounds, tolerance=tolerance
+    )
     tally: Counter[str] = Counter()
     dropped: Counter[str] = Counter()
     found: list[Gait] = []
-    for number, kind in enumerate(kinds):
-        problem = Problem(
-            model, wanted, free=tuple(free or ()), symmetric=kind, tolerance=tolerance
-        )
-        _check_count(problem)
+    for number, problem in enumerate(problems):
         sampler = Sampler(problem, np.random.default_rng(seed), ranges)
         for count in range(starts):
             _try(problem, sampler, found, tally)
-            progress((number + (count + 1) / starts) / len(kinds))
+            progress((number + (count + 1) / starts) / len(problems))
         dropped.update(sampler.dropped)
     found.sort(key=lambda gait: (not gait.symmetric, gait.family, gait.model.touchdown["fore"]))
     return Search(tuple(found), dict(tally), dict(dropped))
+
+
+def pose_problems(
+    model: Model,
+    fixed: Mapping[str, float],
+    *,
+    free: Mapping[str, tuple[float, float]] | None = None,
+    symmetric: bool | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> list[Problem]:
+    """What `find_gaits` solves: symmetric gaits, general ones, or both. Raises as it does."""
+    kinds = [symmetric] if symmetric is not None else [True, False]
+    named = {*fixed, *(bounds or {}), *(free or {})}
+    if symmetric is None and not _symmetry_allows(model, named):
+        kinds = [False]
+    problems = [
+        Problem(model, fixed, free=tuple(free or ()), symmetric=kind, tolerance=tolerance)
+        for kind in kinds
+    ]
+    for problem in problems:
+        _check_count(problem)
+    return problems
 
 
 def _symmetry_allows(model: Model, names: set[str]) -> bool:

@@ -75,7 +75,12 @@ class Ensemble:
         return len(self.cases)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self.columns:
+            raise UnknownNameError("column", str(name), self.columns)
         return self.columns[name]
+
+    def __repr__(self) -> str:
+        return f"<Ensemble of {len(self)} runs of {self.cases.model.name}: {self.tally}>"
 
     @property
     def tally(self) -> dict[str, int]:
@@ -85,6 +90,8 @@ class Ensemble:
 
     def run(self, index: int) -> Run:
         """Simulate one of the runs again, alone and with all that it leaves behind."""
+        if not -len(self) <= index < len(self):
+            raise ParameterError(f"there is no run {index}", f"give 0 to {len(self) - 1}")
         return simulate(self.cases.one(index), strides=self.strides, tolerance=self.tolerance)
 
 
@@ -106,6 +113,11 @@ def simulate_many(
     save that a body that starts in the ground has fallen there. ``processes`` share the work
     without a change to the results. Raises `UnknownNameError` and `ParameterError`.
     """
+    for given in (states, parameters):
+        if not (given is None or isinstance(given, Mapping)):
+            raise ParameterError(
+                f"{shortened(given)} does not tell what varies", 'give {"height": [...], ...}'
+            )
     cases = make_cases(model, {**(states or {}), **(parameters or {})})
     parts = [slice(at, at + PIECE) for at in range(0, len(cases), PIECE)]
     pieces = []
@@ -168,6 +180,8 @@ def make_cases(model: Model, given: Mapping[str, ArrayLike], body: Model | None 
 
     ``body`` is given where there are other cases that have to share a system with these.
     """
+    if not isinstance(model, Model):
+        raise ParameterError(f"{shortened(model)} is no model", "load one with load_model")
     known = {*model.apex, *model.parameter_names}
     bounds = _bounds(model)
     varied: dict[str, Array] = {}

@@ -180,8 +180,8 @@ def _count(basin: Basin) -> str:
     row = basin.row()
     if not row["lasted"]:
         return f"none of {row['starts']} starts lasts"
-    come, go = (f"{100 * row[name] / row['starts']:.3g} %" for name in ("settled", "elsewhere"))
-    if not row["elsewhere"]:
+    come, go = (f"{100 * row[name] / row['starts']:.3g} %" for name in ("settled", "not_settled"))
+    if not row["not_settled"]:
         return f"{come} of {row['starts']} come to it"
     gaits = all(other.radius is not None for other in basin.others)
     return f"{come} come to it,\n{go} {'to other gaits' if gaits else 'not, or not yet'}"

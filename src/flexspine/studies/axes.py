@@ -72,6 +72,11 @@ class Axis:
             steps = check_count(f"axis '{name}': steps", steps)
         numbers: dict[str, Any] = {key: float(value) for key, value in bounds.items()}
         axis = cls(name, steps=steps, **numbers)
+        for key in ("around", "within"):
+            if numbers.get(key, 0.0) < 0:
+                raise InputError(f"axis '{name}': {key} = {numbers[key]:g} is negative", FORMS)
+        if steps == 1:
+            raise InputError(f"axis '{name}': one step makes no range", "give 2, or a list")
         low, high = axis.range(1.0)
         if not low <= high:
             raise InputError(f"axis '{name}' goes from {low:g} down to {high:g}", "swap them")

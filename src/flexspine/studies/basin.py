@@ -107,7 +107,7 @@ class Basin:
             "fell_in_the_first_stride": int((self.possible & (self.strides == 0)).sum()),
             "lasted": int(self.lasted.sum()),
             "settled": int(self.settled.sum()),
-            "elsewhere": int((self.lasted & ~self.settled).sum()),
+            "not_settled": int((self.lasted & ~self.settled).sum()),
         }
 
 
@@ -148,6 +148,9 @@ def basin_plan(
     """
     if not gaits:
         raise ParameterError("there is no gait", "give one at least")
+    for name, gait in gaits.items():
+        if not isinstance(gait, Gait):
+            raise ParameterError(f"'{name}' is no gait", "make one with examine(model)")
     ways = dict(_usual_slice(gaits) if over is None else over)
     check_count("points", points)
     for name, gait in gaits.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flexspine.gaits.continuation import Branch, trace_branch
+from flexspine.gaits.family import FOLD
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.stability import Stability, floquet_multipliers
 from flexspine.hybrid.compile import Array
@@ -69,4 +70,11 @@ class Line:
     @property
     def end(self) -> str:
         """Why it leads no further."""
-        return "; ".join(self.branch.ends) if self.branch else ""
+        if self.branch is None:
+            return ""
+        turns = [
+            f"it turns at {self.branch.over} = {mark.value:.6g}"
+            for mark in self.branch.landmarks
+            if mark.kind == FOLD
+        ]
+        return "; ".join(dict.fromkeys([*turns, *self.branch.ends]))

@@ -14,6 +14,7 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
+from flexspine.parameters import shortened
 from flexspine.studies.axes import GRID, Axis
 from flexspine.studies.basin import read_columns
 from flexspine.studies.plan import GAITS, Plan
@@ -114,8 +115,12 @@ def map_plan(
     Both ranges are low and high, SI. Energy and apex height are the gait's. Raises
     `ParameterError` and `UnknownNameError`.
     """
+    if not isinstance(gait, Gait):
+        raise ParameterError(f"{shortened(gait)} is no gait", "make one with examine(model)")
     if gait.flaw is not None:
         raise ParameterError(f"there is no gait to follow: {gait.flaw}", "find one first")
+    if STIFFNESS not in gait.model.numbers:
+        raise InputError(f"'{gait.model.name}' has no {STIFFNESS!r}", "map a body that has")
     for name, ends in ((STIFFNESS, stiffnesses), (SPEED, speeds)):
         if not 0 < ends[0] < ends[1] < inf:
             raise ParameterError(

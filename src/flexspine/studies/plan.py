@@ -38,6 +38,8 @@ TASKS = (RUNS, SEARCHES, GAITS)
 MOST_STRIDES, MOST_RUNS, FEWEST_RUNS = 400_000, 16384, 256
 SEARCHES_EACH = 16
 
+WORDS = {bool: "true or false", dict: "a table", str: "the name of an axis"}
+
 ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
 
 # Seeds fit into a TOML file and into a manifest.
@@ -135,10 +137,10 @@ class Plan:
             "method": self.method,
             "samples": self.samples,
             "seed": self.seed,
-            "chunk": self.chunk_points,
             "options": {**self.options, "tolerance": self.tolerance},
             "axes": {axis.name: axis.record() for axis in self.axes},
             "models": [model_record(model) for model in self.models],
+            "chunk": self.chunk_points,
         }
         # NumPy's numbers become plain ones.
         return dict(json.loads(json.dumps(record, default=lambda number: number.item())))
@@ -198,6 +200,11 @@ def _check(plan: Plan) -> None:
         raise InputError("no axis varies", "add one under [axes]")
     if plan.task != RUNS and any(axis.keeps for axis in plan.axes):
         raise InputError("an axis that keeps the energy is for runs", "leave it out")
+    for axis in plan.axes:
+        if plan.method != GRID and axis.steps is not None:
+            raise InputError(
+                f"axis '{axis.name}' has steps, which are for a grid", "leave them out"
+            )
     _check_options(plan)
     for model in plan.models:
         _check_axes(plan, model)
@@ -208,7 +215,9 @@ def _check_once(what: str, names: list[str]) -> None:
         if not isinstance(name, str):
             raise InputError(f"the {what} {shortened(name)} has no name", "name it")
         if names.count(name) > 1:
-            raise InputError(f"{what} '{name}' is there twice", "give it once")
+            raise InputError(
+                f"{what} '{name}' is there twice", "give it once, or rename one; rows go by names"
+            )
 
 
 def _check_options(plan: Plan) -> None:
@@ -218,13 +227,15 @@ def _check_options(plan: Plan) -> None:
             raise UnknownNameError(f"option of {plan.task}", name, known)
         if known[name] not in (int, float) and not isinstance(value, known[name]):
             raise ParameterError(
-                f"{name} = {shortened(value)} is not usable", f"see the task '{plan.task}'"
+                f"{name} = {shortened(value)} is not usable", f"give {WORDS[known[name]]}"
             )
     check_between("tolerance", plan.options.get("tolerance", DEFAULT_TOLERANCE), *TOLERANCES)
     fixable = {*OF_GAITS, *ANGLES, *(name for model in plan.models for name in model.apex)}
     for name, value in plan.options.get("fixed", {}).items():
         if name not in fixable:
             raise UnknownNameError("quantity to fix", name, fixable)
+        if name in [axis.name for axis in plan.axes]:
+            raise InputError(f"{name} is both fixed and an axis", "keep one of them")
         if not is_finite(value):
             raise ParameterError(f"fixed {name} = {shortened(value)} is no number", "give a number")
     for name in ("strides", "starts"):
@@ -250,6 +261,11 @@ def _check_axes(plan: Plan, model: Model) -> None:
     quantities = set(OF_GAITS) if plan.task != RUNS else set()
     anywhere = {name for each in plan.models for name in each.numbers}
     for axis in plan.axes:
+        if axis.around is not None and model.numbers.get(axis.name) == 0:
+            raise InputError(
+                f"axis '{axis.name}' is around 0 with '{model.name}', where a share is nothing",
+                "give {within = AMOUNT}",
+            )
         if axis.name in quantities:
             axis.own(model)
             continue

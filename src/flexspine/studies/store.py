@@ -27,6 +27,10 @@ from flexspine.studies.plan import Plan
 
 MANIFEST, ROWS, LOCK, PARTIAL = "manifest.json", "rows", ".flexspine-lock", ".partial-"
 ENTRIES = {"key": str, "plan": dict, "made_with": dict}
+# How many differences are told.
+TOLD = 3
+
+ANEW = "begin the sweep anew in another directory"
 LIBRARIES = ("heyoka", "numpy", "scipy", "sympy", "pyarrow")
 
 
@@ -109,7 +113,9 @@ class Store:
             return
         self.manifest = read_manifest(self.path)
         if self.manifest["key"] != self.plan.key:
-            what = _difference(self.manifest["plan"], self.plan.record())
+            found = _differences(self.manifest["plan"], self.plan.record())
+            more = f", and {len(found) - TOLD} more" if len(found) > TOLD else ""
+            what = ", ".join(found[:TOLD]) + more
             raise InputError(
                 f"'{self.path}' holds a sweep with another configuration ({what})",
                 "give another directory, or the configuration it was begun with",
@@ -117,7 +123,20 @@ class Store:
         for folder in (self.path, *self.path.glob(f"{ROWS}/*")):
             for left in folder.glob(f"{PARTIAL}*"):
                 left.unlink()
+        self._refuse_strangers()
         self.finished = {n for n in range(self.plan.chunks) if self.file(n).exists()}
+
+    def _refuse_strangers(self) -> None:
+        """Whoever reads the rows would read what is not of this sweep as well."""
+        ours = {self.file(chunk) for chunk in range(self.plan.chunks)}
+        for file in sorted(self.path.glob(f"{ROWS}/**/*.parquet")):
+            if file not in ours:
+                raise InputError(f"'{file}' is not of this sweep", "move it elsewhere")
+
+    def held(self) -> list[int]:
+        """The chunks that are there, without going on with the sweep."""
+        self._refuse_strangers()
+        return [chunk for chunk in range(self.plan.chunks) if self.file(chunk).exists()]
 
     def file(self, chunk: int) -> Path:
         """Where the rows of a chunk are."""
@@ -190,7 +209,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         manifest = None
     known = manifest if isinstance(manifest, dict) else {}
     if not all(isinstance(known.get(entry), kind) for entry, kind in ENTRIES.items()):
-        raise InputError(f"the manifest in '{path}' is damaged", "begin the sweep anew")
+        raise InputError(f"the manifest in '{path}' is damaged", ANEW)
     return known
 
 
@@ -200,11 +219,9 @@ def read_plan_of(path: Path) -> Plan:
     try:
         plan = Plan.revive(manifest["plan"])
     except InputError as failure:
-        raise InputError(
-            f"the manifest in '{path}' is damaged ({failure.message})", "begin the sweep anew"
-        ) from None
+        raise InputError(f"the manifest in '{path}' is damaged ({failure.message})", ANEW) from None
     if plan.key != manifest["key"]:
-        raise InputError(f"the manifest in '{path}' was changed", "begin the sweep anew")
+        raise InputError(f"the manifest in '{path}' was changed", ANEW)
     return plan
 
 
@@ -223,20 +240,25 @@ def _processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def _difference(before: Any, now: Any, where: str = "") -> str:
-    """The first thing in which two records differ."""
+def _differences(before: Any, now: Any, where: str = "") -> list[str]:
+    """Everything in which two records differ."""
     if isinstance(before, dict) and isinstance(now, dict):
-        for name in [*before, *(n for n in now if n not in before)]:
+        found: list[str] = []
+        for name in dict.fromkeys([*before, *now]):
             if before.get(name) != now.get(name):
                 inner = f"{where}.{name}" if where else name
-                return _difference(before.get(name), now.get(name), inner)
+                found += _differences(before.get(name), now.get(name), inner)
+        return found
     if isinstance(before, list) and isinstance(now, list) and _names(before) != _names(now):
-        return f"{where} were {_names(before)} and are {_names(now)}"
+        return [f"{where} were {_names(before)} and are {_names(now)}"]
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        for number, (one, other) in enumerate(zip(before, now, strict=True)):
-            if one != other:
-                return _difference(one, other, f"{where}[{number}]")
-    return f"{where} was {shortened(before)} and is {shortened(now)}"
+        pairs = enumerate(zip(before, now, strict=True))
+        inner = [_differences(one, other, f"{where}[{n}]") for n, (one, other) in pairs]
+        return [each for part in inner for each in part]
+    if before == now:
+        return []
+    told = ["nothing" if value is None else shortened(value) for value in (before, now)]
+    return [f"{where} was {told[0]} and is {told[1]}"]
 
 
 def _names(records: list[Any]) -> str:

@@ -10,11 +10,12 @@ from typing import Any
 
 from flexspine.errors import InputError
 from flexspine.models.simulation import check_count
+from flexspine.parameters import shortened
 from flexspine.studies.parts import digest_of
 from flexspine.studies.plan import Plan
 from flexspine.studies.plan_file import read_plan
-from flexspine.studies.store import Store, made_with, read_manifest, read_plan_of
-from flexspine.studies.tasks import do_chunk
+from flexspine.studies.store import MANIFEST, Store, made_with, read_manifest, read_plan_of
+from flexspine.studies.tasks import check_task, do_chunk
 from flexspine.workers.crew import Crew
 from flexspine.workers.local import LocalWorkers
 
@@ -59,8 +60,12 @@ def sweep(
     of how many. Raises `InputError`, `MachineError` where workers fail, and `OSError` where the
     disk does.
     """
+    if not isinstance(plan, Plan | str | Path):
+        raise InputError(f"{shortened(plan)} is no plan", "give one, or the path of a TOML file")
     plan = plan if isinstance(plan, Plan) else read_plan(plan)
     begun = time.monotonic()
+    if not (Path(out) / MANIFEST).exists():
+        check_task(plan)  # what was begun has been checked
     workers = min(check_count("processes", processes), plan.chunks)
     # Workers that cannot be had leave no directory behind.
     with crew_of(workers, client) as crew, Store(Path(out), plan).opened() as store:
@@ -87,19 +92,21 @@ def crew_of(processes: int, client: Any) -> Crew:
 
 @dataclass(frozen=True)
 class Rerun:
-    """Whether a sweep came out the same: ``differing`` are chunks that did not, with their files.
+    """Whether a sweep came out the same: ``differing`` are chunks that did not, with their files,
+    ``missing`` those of a finished sweep that are no longer there.
 
     ``changed`` tells, by name, what it was made with and what that is now, where they differ.
     """
 
     chunks: int
     differing: Mapping[int, Path]
+    missing: tuple[int, ...]
     changed: Mapping[str, tuple[str, str]]
 
     @property
     def same(self) -> bool:
-        """Whether every chunk came out bit for bit the same."""
-        return not self.differing
+        """Whether every chunk is there and came out bit for bit the same."""
+        return not self.differing and not self.missing
 
 
 def rerun(
@@ -115,7 +122,7 @@ def rerun(
     """
     manifest, plan = read_manifest(Path(path)), read_plan_of(Path(path))
     store = Store(Path(path), plan)
-    chunks = [n for n in range(plan.chunks) if store.file(n).exists()]
+    chunks = store.held()
     if not chunks:
         raise InputError(f"'{path}' has no finished chunk", "finish the sweep first")
     differing: dict[int, Path] = {}
@@ -127,4 +134,5 @@ def rerun(
             progress(count, len(chunks))
     before, now = manifest["made_with"], made_with()
     changed = {n: (before.get(n, ""), v) for n, v in now.items() if before.get(n) != v}
-    return Rerun(len(chunks), dict(sorted(differing.items())), changed)
+    lost = set(range(plan.chunks)) - set(chunks) if manifest.get("finished") else set()
+    return Rerun(len(chunks), dict(sorted(differing.items())), tuple(sorted(lost)), changed)

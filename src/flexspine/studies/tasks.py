@@ -10,8 +10,9 @@ import numpy as np
 
 from flexspine.errors import InputError, ParameterError
 from flexspine.gaits.gait import Gait, examine
-from flexspine.gaits.search import DEFAULT_STARTS, find_gaits
+from flexspine.gaits.search import DEFAULT_STARTS, find_gaits, pose_problems
 from flexspine.gaits.stability import floquet_multipliers
+from flexspine.hybrid.compile import Array
 from flexspine.models.many import make_cases, run_cases
 from flexspine.models.model import Model
 from flexspine.models.presets import load_model
@@ -19,7 +20,7 @@ from flexspine.parameters import values
 from flexspine.studies.axes import OF_GAITS
 from flexspine.studies.following import Line, LostGaitError, carried
 from flexspine.studies.parts import Part, make_part
-from flexspine.studies.plan import GAITS, RUNS, Plan
+from flexspine.studies.plan import GAITS, RUNS, SEARCHES, Plan
 from flexspine.studies.tables import Row, gait_row
 
 if TYPE_CHECKING:
@@ -41,6 +42,30 @@ def do_chunk(work: tuple[Plan, int]) -> Part:
     plan, chunk = work
     table = _runs(plan, chunk) if plan.task == RUNS else _gaits(plan, chunk)
     return make_part(table)
+
+
+def check_task(plan: Plan) -> None:
+    """Try what can be known before anything is done. Raises `InputError`."""
+    for number, model in enumerate(plan.models):
+        if plan.task == GAITS:
+            own = examine(model, tolerance=plan.tolerance)
+            if own.flaw is not None:
+                raise InputError(
+                    f"the start of '{model.name}' is no gait to follow: {own.flaw}",
+                    "give a gait file, as 'flexspine gait --out' makes it",
+                )
+        elif plan.task == SEARCHES:
+            given = _given(model, plan.at(number * plan.chunks_each))
+            first = {name: float(column[0]) for name, column in given.items()}
+            body, fixed = _request(
+                model, first, dict(plan.options.get("fixed", {})), plan.tolerance
+            )
+            pose_problems(body, fixed, symmetric=plan.options.get("symmetric"))
+
+
+def _given(model: Model, points: dict[str, Array]) -> dict[str, Array]:
+    """The points of what a model has."""
+    return {name: column for name, column in points.items() if name in {*model.numbers, *OF_GAITS}}
 
 
 def column_of(axis: str) -> str:
@@ -107,7 +132,7 @@ def _searched(plan: Plan, chunk: int) -> Iterator[Row]:
     points, options = plan.at(chunk), plan.options
     for i in range(count):
         row: Row = {"point": first + i}
-        given = {n: float(c[i]) for n, c in points.items() if n in {*model.numbers, *OF_GAITS}}
+        given = {n: float(column[i]) for n, column in _given(model, points).items()}
         row |= {column_of(name): value for name, value in given.items()}
         seed = np.random.SeedSequence((plan.seed, chunk // plan.chunks_each, first + i))
         try:
@@ -147,7 +172,7 @@ def _followed(plan: Plan, chunk: int) -> Iterator[Row]:
     """The gait at every point of a line, followed from the model's own."""
     model, first, count = plan.of_chunk(chunk)
     points, over = plan.at(chunk), plan.axes[-1].name
-    given = {name: column for name, column in points.items() if name in {*model.numbers, *OF_GAITS}}
+    given = _given(model, points)
     rows: list[Row] = [
         {"point": first + i, **{column_of(n): float(c[i]) for n, c in given.items()}}
         for i in range(count)
