@@ -17,6 +17,8 @@ from functools import cached_property
 
 import sympy as sp
 
+from flexspine.mechanics.elimination import solve_symmetric
+
 Definitions = Mapping[sp.Symbol, sp.Expr]
 
 
@@ -91,53 +93,11 @@ class Lagrangian:
             force - bias
             for force, bias in zip(self.generalized_forces, self.velocity_forces, strict=True)
         ]
-        return _solve_symmetric(self.mass_matrix, right)
+        definitions, (solution,) = solve_symmetric(self.mass_matrix, [right])
+        return definitions, solution
 
     def _d(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         return total_derivative(expression, variable, self.definitions)
-
-
-def _solve_symmetric(
-    matrix: sp.Matrix, right: list[sp.Expr]
-) -> tuple[dict[sp.Symbol, sp.Expr], tuple[sp.Expr, ...]]:
-    """Solve by ``L D L^T`` without pivoting, each intermediate a definition of its own.
-
-    A mass matrix is positive definite, so no pivot vanishes; entries that are zero by structure
-    are skipped, which leaves uncoupled coordinates uncoupled.
-    """
-    n = len(right)
-    definitions: dict[sp.Symbol, sp.Expr] = {}
-
-    def define(name: str, expression: sp.Expr) -> sp.Expr:
-        if expression.is_Atom:
-            return expression
-        symbol = sp.Symbol(name, real=True)
-        definitions[symbol] = expression
-        return symbol
-
-    work = matrix.copy()
-    rest = list(right)
-    factors: dict[tuple[int, int], sp.Expr] = {}
-    pivots: list[sp.Expr] = []
-    for k in range(n):
-        pivots.append(define(f"D_{k + 1}", work[k, k]))
-        rest[k] = define(f"b_{k + 1}", rest[k])
-        rows = [i for i in range(k + 1, n) if work[i, k] != 0]
-        below = {i: define(f"M_{i + 1}{k + 1}", work[i, k]) for i in rows}
-        for i in rows:
-            factors[i, k] = define(f"L_{i + 1}{k + 1}", below[i] / pivots[k])
-            rest[i] = rest[i] - factors[i, k] * rest[k]
-            for j in rows:
-                if j <= i:
-                    work[i, j] = work[i, j] - factors[i, k] * below[j]
-    solution: list[sp.Expr] = [sp.S.Zero] * n
-    for k in reversed(range(n)):
-        value = rest[k] / pivots[k]
-        for i in range(k + 1, n):
-            if (i, k) in factors:
-                value -= factors[i, k] * solution[i]
-        solution[k] = define(f"a_{k + 1}", value)
-    return definitions, tuple(solution)
 
 
 def time_derivative(system: Lagrangian, expression: sp.Expr) -> sp.Expr:
