@@ -209,7 +209,7 @@ class Linkage:
         angles = self.angles(q)
         rows = []
         for name in feet:
-            arms = self._foot_arms(name)
+            arms = self.foot_arms(name)
             for column, turned in enumerate((-arms * np.sin(angles), arms * np.cos(angles))):
                 base = np.broadcast_to(np.eye(2)[column], (*q.shape[:-1], 2))
                 rows.append(np.concatenate([turned, base], axis=-1))
@@ -221,7 +221,7 @@ class Linkage:
         angles, squares = self.angles(q), self.angles(rates) ** 2
         parts = []
         for name in feet:
-            arms = self._foot_arms(name)
+            arms = self.foot_arms(name)
             parts += [-(squares * np.cos(angles)) @ arms, -(squares * np.sin(angles)) @ arms]
         result: Array = np.stack(parts, axis=-1)
         return result
@@ -243,6 +243,7 @@ class Linkage:
     def _foot(self, name: str) -> Foot:
         return next(foot for foot in self.feet if foot.name == name)
 
-    def _foot_arms(self, name: str) -> Array:
+    def foot_arms(self, name: str) -> Array:
+        """The lever arms of a foot, shape (n,)."""
         foot = self._foot(name)
         return self.arms(foot.link, foot.at)

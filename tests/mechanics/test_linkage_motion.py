@@ -1,0 +1,98 @@
+"""The motion of a linkage in symbols, against the same solved in numbers."""
+
+from __future__ import annotations
+
+import heyoka as hy
+import numpy as np
+import pytest
+import sympy as sp
+from numpy.typing import NDArray
+
+from flexspine import load_robot
+from flexspine.hybrid.lowering import Lowering
+from flexspine.mechanics.linkage import Linkage
+from flexspine.mechanics.linkage_motion import LinkageMotion
+from flexspine.mechanics.stance import constrained
+from tests.mechanics.test_linkage import uneven
+
+Array = NDArray[np.float64]
+
+STANCES = [[], ["toe_2"], ["toe_1", "toe_3"], ["toe_1", "toe_2", "toe_4"]]
+
+
+def absolute(linkage: Linkage, q: Array) -> Array:
+    """Absolute angles and the base."""
+    return np.concatenate([linkage.angles(q), q[-2:]])
+
+
+class Compiled:
+    """Accelerations and forces as a function of states and torques."""
+
+    def __init__(self, linkage: Linkage, feet: list[str]) -> None:
+        motion = LinkageMotion(linkage)
+        torques = {j.name: sp.Symbol(f"t_{j.name}") for j in linkage.joints if j.actuated}
+        definitions, accelerations, forces = motion.stance(feet, torques)
+        inputs = [*motion.coordinates, *motion.rates, *torques.values()]
+        variables = [hy.expression(f"v{i}") for i in range(len(inputs))]
+        known = dict(zip(inputs, variables, strict=True))
+        lower = Lowering(known, tuple(motion.values), definitions, 0)
+        outputs = [lower(each) for each in (*accelerations, *forces)]
+        self.function = hy.cfunc(outputs, vars=variables)
+        self.numbers = np.array([float(c.subs(motion.values)) for c in lower.coefficients])
+        self.size = linkage.size
+
+    def __call__(self, *states: Array) -> tuple[Array, Array]:
+        found = self.function(np.concatenate(states), pars=self.numbers)
+        return found[: self.size], found[self.size :].reshape(-1, 2)
+
+
+def assert_same_motion(linkage: Linkage, feet: list[str], torque: float) -> None:
+    compiled = Compiled(linkage, feet)
+    rng = np.random.default_rng(11)
+    for _ in range(100):
+        q, rates = rng.uniform(-1.5, 1.5, linkage.size), rng.normal(0, 2, linkage.size)
+        torques = rng.normal(0, torque, linkage.actuation.shape[1])
+        accelerations, forces = compiled(absolute(linkage, q), absolute(linkage, rates), torques)
+        expected = constrained(linkage, q, rates, feet, torques)
+        size = np.abs(expected.accelerations).max()
+        np.testing.assert_allclose(
+            accelerations, absolute(linkage, expected.accelerations), atol=1e-11 * size
+        )
+        if feet:
+            most = np.abs(expected.forces).max()
+            np.testing.assert_allclose(forces, expected.forces, atol=1e-10 * most)
+
+
+@pytest.mark.parametrize("feet", STANCES, ids=lambda feet: "+".join(feet) or "none")
+def test_the_robot_moves_as_in_numbers(feet: list[str]) -> None:
+    assert_same_motion(load_robot("sc618").linkage, feet, 5.0)
+
+
+@pytest.mark.parametrize("feet", [[], ["f"], ["f", "h"]], ids=lambda feet: "+".join(feet) or "none")
+def test_an_uneven_tree_moves_as_in_numbers(feet: list[str]) -> None:
+    assert_same_motion(uneven(), feet, 1.0)
+
+
+def test_one_build_serves_robots_of_other_numbers() -> None:
+    """The expressions name no numbers; only what vanishes leaves them."""
+    texts = [
+        sp.srepr(LinkageMotion(load_robot("sc618", {"spine.stiffness": k}).linkage).forces({})[5])
+        for k in (200, 300)
+    ]
+    assert texts[0] == texts[1]
+    locked = LinkageMotion(load_robot("sc618", {"spine.stiffness": 0}).linkage).forces({})[5]
+    assert sp.srepr(locked) != texts[0]
+
+
+def test_feet_are_where_they_are_in_numbers() -> None:
+    linkage = load_robot("sc618").linkage
+    motion = LinkageMotion(linkage)
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-1.5, 1.5, 12)
+    known = dict(zip(motion.coordinates, absolute(linkage, q), strict=True))
+    for foot in linkage.feet:
+        place = [sp.sympify(part) for part in motion.foot(foot.name)]
+        found = [
+            float(part.subs(motion.definitions).subs(motion.values).subs(known)) for part in place
+        ]
+        assert found == pytest.approx(linkage.foot(q, foot.name), abs=1e-14)
