@@ -96,3 +96,44 @@ def test_feet_are_where_they_are_in_numbers() -> None:
             float(part.subs(motion.definitions).subs(motion.values).subs(known)) for part in place
         ]
         assert found == pytest.approx(linkage.foot(q, foot.name), abs=1e-14)
+
+
+def test_a_robot_pinned_by_one_foot_keeps_its_energy_and_its_foot() -> None:
+    """Without a damper; let go from a crouch it swings wildly for ten seconds."""
+    linkage = load_robot("sc618", {"spine.damping": 0}).linkage
+    motion = LinkageMotion(linkage)
+    definitions, accelerations, _ = motion.stance(["toe_1"], {})
+    inputs = [*motion.coordinates, *motion.rates]
+    variables = [hy.expression(f"v{i}") for i in range(24)]
+    known = dict(zip(inputs, variables, strict=True))
+    lower = Lowering(known, tuple(motion.values), definitions, 0)
+    rates = [lower(each) for each in accelerations]
+    field = [
+        *zip(variables[:12], variables[12:], strict=True),
+        *zip(variables[12:], rates, strict=True),
+    ]
+    q = np.zeros(12)
+    turns = {"knee_1": -0.9, "hip_1": -1.02, "hip_2": -3.04, "knee_2": 0.9, "hip_3": -2.12,
+             "knee_3": 0.9, "hip_4": -2.02, "knee_4": 0.9}  # fmt: skip
+    q[0] = 1.92
+    for name, turn in turns.items():
+        q[linkage.place[name]] = turn
+    integrator = hy.taylor_adaptive(
+        field,
+        [*absolute(linkage, q), *np.zeros(12)],
+        tol=1e-12,
+        compact_mode=True,
+        pars=[float(c.subs(motion.values)) for c in lower.coefficients],
+    )
+    relative = np.linalg.inv(np.array([absolute(linkage, row) for row in np.eye(12)]).T)
+    start = float(linkage.potential_energy(q))
+    most, drift = 0.0, 0.0
+    for second in np.linspace(0.1, 10, 100):
+        integrator.propagate_until(second)
+        here, speed = relative @ integrator.state[:12], relative @ integrator.state[12:]
+        kinetic = float(linkage.kinetic_energy(here, speed))
+        most = max(most, kinetic)
+        drift = max(drift, abs(kinetic + float(linkage.potential_energy(here)) - start))
+        assert np.abs(linkage.foot(here, "toe_1")).max() <= 1e-12
+    assert most > 10
+    assert drift <= 1e-10 * most
