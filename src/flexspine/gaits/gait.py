@@ -16,8 +16,8 @@ from flexspine.models.legs import SIDES, STANCE_PHASES
 from flexspine.models.model import Model
 from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count, simulate
 
-# Natural units; what a gait may miss its start by. In the wildest, a stride makes 1e-13 as large.
-CLOSED = 1e-10
+# Natural units; what a gait may miss its start by.
+CLOSED = 1e-11
 
 # rad, and relative for forces; gaits are known to 1e-11.
 SYMMETRY = 1e-7
