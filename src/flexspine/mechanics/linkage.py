@@ -208,23 +208,23 @@ class Linkage:
         """``J``, the velocities of feet by ``q'``: x and y in turn, shape (..., 2 feet, N)."""
         angles = self.angles(q)
         rows = []
-        for name in feet:
+        for name in (feet := list(feet)):
             arms = self.foot_arms(name)
             for column, turned in enumerate((-arms * np.sin(angles), arms * np.cos(angles))):
                 base = np.broadcast_to(np.eye(2)[column], (*q.shape[:-1], 2))
                 rows.append(np.concatenate([turned, base], axis=-1))
-        result: Array = np.stack(rows, axis=-2) @ self._to_absolute
+        whole = np.array(rows).reshape(2 * len(feet), *q.shape[:-1], self.size)
+        result: Array = np.moveaxis(whole, 0, -2) @ self._to_absolute
         return result
 
     def foot_bias(self, q: Array, rates: Array, feet: Iterable[str]) -> Array:
         """``J' q'``, the accelerations of feet without ``q''``, shape (..., 2 feet)."""
         angles, squares = self.angles(q), self.angles(rates) ** 2
         parts = []
-        for name in feet:
+        for name in (feet := list(feet)):
             arms = self.foot_arms(name)
             parts += [-(squares * np.cos(angles)) @ arms, -(squares * np.sin(angles)) @ arms]
-        result: Array = np.stack(parts, axis=-1)
-        return result
+        return np.moveaxis(np.array(parts).reshape(2 * len(feet), *q.shape[:-1]), 0, -1)
 
     def kinetic_energy(self, q: Array, rates: Array) -> Array:
         """In J, shape (...)."""

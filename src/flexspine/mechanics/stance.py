@@ -43,10 +43,9 @@ def constrained(
     Raises `numpy.linalg.LinAlgError` where the feet are not independent.
     """
     n = linkage.size
-    jacobian = linkage.foot_jacobian(q, feet) if feet else np.zeros((0, n))
-    matrix = np.block([[linkage.mass_matrix(q), -jacobian.T], [jacobian, _nothing(feet, feet)]])
+    jacobian = linkage.foot_jacobian(q, feet)
     applied = linkage.actuation @ torques - passive_forces(linkage, q, rates)
-    solved = np.linalg.solve(matrix, np.concatenate([applied, -_bias(linkage, q, rates, feet)]))
+    solved = _solve(linkage, q, jacobian, applied, -linkage.foot_bias(q, rates, feet))
     return Motion(solved[:n], solved[n:].reshape(-1, 2))
 
 
@@ -58,26 +57,17 @@ def tracked(
     Regular with no foot, one foot or two feet of different hips, unless the toes and a passive
     joint are in line. Raises `numpy.linalg.LinAlgError` elsewhere.
     """
-    n, motors = linkage.size, linkage.actuation
-    m, k = motors.shape[1], 2 * len(feet)
-    jacobian = linkage.foot_jacobian(q, feet) if feet else np.zeros((0, n))
-    if np.linalg.matrix_rank(np.concatenate([jacobian, motors.T])) < k + m:
+    n, motors, k = linkage.size, linkage.actuation.T, 2 * len(feet)
+    held = np.concatenate([linkage.foot_jacobian(q, feet), motors])
+    if np.linalg.matrix_rank(held) < len(held):
         raise np.linalg.LinAlgError("the feet hold what the motors are to move")
-    matrix = np.block(
-        [
-            [linkage.mass_matrix(q), -jacobian.T, -motors],
-            [jacobian, np.zeros((k, k + m))],
-            [motors.T, np.zeros((m, k + m))],
-        ]
-    )
-    right = [-passive_forces(linkage, q, rates), -_bias(linkage, q, rates, feet), wanted]
-    solved = np.linalg.solve(matrix, np.concatenate(right))
+    needed = np.concatenate([-linkage.foot_bias(q, rates, feet), wanted])
+    solved = _solve(linkage, q, held, -passive_forces(linkage, q, rates), needed)
     return Tracked(solved[:n], solved[n : n + k].reshape(-1, 2), solved[n + k :])
 
 
-def _bias(linkage: Linkage, q: Array, rates: Array, feet: Sequence[str]) -> Array:
-    return linkage.foot_bias(q, rates, feet) if feet else np.zeros(0)
-
-
-def _nothing(rows: Sequence[str], columns: Sequence[str]) -> Array:
-    return np.zeros((2 * len(rows), 2 * len(columns)))
+def _solve(linkage: Linkage, q: Array, held: Array, applied: Array, needed: Array) -> Array:
+    """Accelerations with ``held q'' = needed`` and the forces along ``held`` for them."""
+    count = len(held)
+    matrix = np.block([[linkage.mass_matrix(q), -held.T], [held, np.zeros((count, count))]])
+    return np.asarray(np.linalg.solve(matrix, np.concatenate([applied, needed])), dtype=float)

@@ -123,19 +123,15 @@ class Store:
         for folder in (self.path, *self.path.glob(f"{ROWS}/*")):
             for left in folder.glob(f"{PARTIAL}*"):
                 left.unlink()
-        self._refuse_strangers()
-        self.finished = {n for n in range(self.plan.chunks) if self.file(n).exists()}
+        self.finished = set(self.held())
 
-    def _refuse_strangers(self) -> None:
-        """Whoever reads the rows would read what is not of this sweep as well."""
+    def held(self) -> list[int]:
+        """The chunks that are there. Raises `InputError` for files that are not of this sweep."""
         ours = {self.file(chunk) for chunk in range(self.plan.chunks)}
         for file in sorted(self.path.glob(f"{ROWS}/**/*.parquet")):
             if file not in ours:
+                # Whoever reads the rows would read it as well.
                 raise InputError(f"'{file}' is not of this sweep", "move it elsewhere")
-
-    def held(self) -> list[int]:
-        """The chunks that are there, without going on with the sweep."""
-        self._refuse_strangers()
         return [chunk for chunk in range(self.plan.chunks) if self.file(chunk).exists()]
 
     def file(self, chunk: int) -> Path:

@@ -82,9 +82,9 @@ class LocalWorkers:
 
         fill()
         while self._busy:
-            busy = {worker.connection: worker for worker in self._busy}
-            for connection in multiprocessing.connection.wait(list(busy)):
-                worker = busy[connection]  # type: ignore[index]
+            busy = self._busy
+            ready = multiprocessing.connection.wait([worker.connection for worker in busy])
+            for worker in [each for each in busy if each.connection in ready]:
                 piece, worker.piece = worker.piece, None
                 assert piece is not None
                 try:
