@@ -15,7 +15,8 @@ from flexspine.hybrid.compile import BoundSystem, compile_system
 from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.integrate import SECTION_TIMEOUT, integrate
-from flexspine.hybrid.lanes import compile_lanes
+from flexspine.hybrid.lanes import LONGEST, compile_lanes
+from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Section
 from flexspine.hybrid.trajectory import HybridState, Trajectory
 from tests.hybrid.test_integrate import LOST, NEVER, E, G, V, Y, ball
@@ -204,6 +205,20 @@ def test_a_guard_that_is_below_zero_on_entry_fires_at_once_or_waits(arming: Armi
     reached = [name == "completed" for name in names(ends)]
     assert reached == [arming is Arming.LEVEL or a < 1.0 for a in above]
     assert ends.time[reached] == pytest.approx(5.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("ends", [None, LOST])
+def test_an_event_at_the_very_end_of_a_step_is_not_lost(ends: OutcomeKind | None) -> None:
+    """Falling steadily, x takes whole steps to zero, within rounding error of either side."""
+    x, n, w = sp.symbols("x n w", real=True)
+    mode = Mode("only", {}, {x: -w}, (Guard("floor", x, ends=ends),))
+    section = Section(("floor",) if ends is None else (), {}, {}, {"x": x}, NEVER)
+    system = HybridSystem("steps", (x,), (n,), (w,), ("only",), lambda _: mode, section)
+    begin = LONGEST * np.arange(1, 61)
+    k = len(begin)
+    found = many(system, Starts("only", numbers(k, begin), numbers(k, 0.0), numbers(k, 1.0)), 1)
+    assert set(names(found)) == {"completed" if ends is None else ends.name}
+    np.testing.assert_allclose(found.time, begin, rtol=1e-13)
 
 
 def wheel() -> HybridSystem:

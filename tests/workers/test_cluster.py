@@ -25,6 +25,7 @@ import flexspine
 from flexspine.errors import InputError, MachineError
 from flexspine.workers import cluster
 from flexspine.workers.cluster import AHEAD, DaskWorkers
+from tests.workers.crews import assert_every_piece_is_done_once
 
 ROOT = Path(__file__).parents[2]
 
@@ -137,22 +138,8 @@ def address(shared: Machines) -> str:
 
 
 def test_every_piece_is_done_once_and_few_are_taken_ahead(address: str) -> None:
-    taken, most, done = 0, 0, dict[int, int]()
-
-    def jobs() -> Iterator[tuple[int, int]]:
-        nonlocal taken
-        for number in range(50):
-            taken += 1
-            yield number, -number
-
     with DaskWorkers(address) as crew:
-        for number, result in crew.map(abs, jobs()):
-            most = max(most, taken - len(done))
-            assert number not in done
-            done[number] = result
-        assert list(crew.map(abs, [])) == []
-    assert done == {number: number for number in range(50)}
-    assert most <= AHEAD * 2
+        assert_every_piece_is_done_once(crew, AHEAD * 2)
     assert "IO loop" not in [thread.name for thread in threading.enumerate()]
 
 

@@ -20,6 +20,7 @@ import pytest
 
 from flexspine.errors import MachineError
 from flexspine.workers.local import MOST_DEATHS, LocalWorkers
+from tests.workers.crews import assert_every_piece_is_done_once
 
 ROOT = Path(__file__).parents[2]
 
@@ -159,22 +160,8 @@ def at_work(command: subprocess.Popen[str]) -> None:
 
 @pytest.mark.parametrize(("count", "most_ahead"), [(1, 1), (2, 3)])
 def test_every_piece_is_done_once_and_few_are_taken_ahead(count: int, most_ahead: int) -> None:
-    taken, most, done = 0, 0, dict[int, int]()
-
-    def jobs() -> Iterator[tuple[int, int]]:
-        nonlocal taken
-        for number in range(50):
-            taken += 1
-            yield number, -number
-
     with LocalWorkers(count) as crew:
-        for number, result in crew.map(abs, jobs()):
-            most = max(most, taken - len(done))
-            assert number not in done
-            done[number] = result
-        assert list(crew.map(abs, [])) == []
-    assert done == {number: number for number in range(50)}
-    assert 1 <= most <= most_ahead
+        assert_every_piece_is_done_once(crew, most_ahead)
 
 
 def test_one_process_is_this_one() -> None:
