@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from flexspine import load_robot
-from flexspine.mechanics.impact import Contact, Impact, Verdict, impact
+from flexspine.mechanics.complementarity import Contact, Verdict
+from flexspine.mechanics.impact import Impact, impact
 from flexspine.mechanics.linkage import Foot, Link, Linkage
 
 Array = NDArray[np.float64]

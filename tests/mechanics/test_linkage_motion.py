@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from flexspine import load_robot
 from flexspine.hybrid.lowering import Lowering
 from flexspine.mechanics.linkage import Linkage
-from flexspine.mechanics.linkage_motion import LinkageMotion
-from flexspine.mechanics.stance import constrained
+from flexspine.mechanics.linkage_motion import SETTLING, LinkageMotion, Standing
+from flexspine.mechanics.stance import constrained, passive_forces
 from tests.mechanics.test_linkage import uneven
 
 Array = NDArray[np.float64]
@@ -25,14 +25,21 @@ def absolute(linkage: Linkage, q: Array) -> Array:
     return np.concatenate([linkage.angles(q), q[-2:]])
 
 
-class Compiled:
-    """Accelerations and forces as a function of states and torques."""
+FRICTION = 0.7
 
-    def __init__(self, linkage: Linkage, feet: list[str]) -> None:
-        motion = LinkageMotion(linkage)
+
+class Compiled:
+    """Accelerations and forces as a function of states, torques and anchors."""
+
+    def __init__(self, linkage: Linkage, feet: list[str], slides: dict[str, bool] | None = None):
+        motion = LinkageMotion(linkage, FRICTION)
         torques = {j.name: sp.Symbol(f"t_{j.name}") for j in linkage.joints if j.actuated}
-        definitions, accelerations, forces = motion.stance(feet, torques)
+        anchors = {name: sp.symbols(f"x_{name} y_{name}") for name in feet}
+        standing = [Standing(name, anchors[name], (slides or {}).get(name)) for name in feet]
+        definitions, accelerations, pushes = motion.stance(standing, torques)
+        forces = [part for name in feet for part in pushes[name]]
         inputs = [*motion.coordinates, *motion.rates, *torques.values()]
+        inputs += [part for anchor in anchors.values() for part in anchor]
         variables = [hy.expression(f"v{i}") for i in range(len(inputs))]
         known = dict(zip(inputs, variables, strict=True))
         lower = Lowering(known, tuple(motion.values), definitions, 0)
@@ -52,7 +59,12 @@ def assert_same_motion(linkage: Linkage, feet: list[str], torque: float) -> None
     for _ in range(100):
         q, rates = rng.uniform(-1.5, 1.5, linkage.size), rng.normal(0, 2, linkage.size)
         torques = rng.normal(0, torque, linkage.actuation.shape[1])
-        accelerations, forces = compiled(absolute(linkage, q), absolute(linkage, rates), torques)
+        anchors = np.array([linkage.foot(q, name) for name in feet]).ravel()
+        if feet:
+            # What settles drift has nothing to do where there is none.
+            rates -= np.linalg.pinv(jac := linkage.foot_jacobian(q, feet)) @ (jac @ rates)
+        here = absolute(linkage, q), absolute(linkage, rates)
+        accelerations, forces = compiled(*here, torques, anchors)
         expected = constrained(linkage, q, rates, feet, torques)
         size = np.abs(expected.accelerations).max()
         np.testing.assert_allclose(
@@ -71,6 +83,51 @@ def test_the_robot_moves_as_in_numbers(feet: list[str]) -> None:
 @pytest.mark.parametrize("feet", [[], ["f"], ["f", "h"]], ids=lambda feet: "+".join(feet) or "none")
 def test_an_uneven_tree_moves_as_in_numbers(feet: list[str]) -> None:
     assert_same_motion(uneven(), feet, 1.0)
+
+
+@pytest.mark.parametrize("slides", [{"toe_1": True}, {"toe_1": False, "toe_4": True}])
+def test_feet_that_slide_obey_friction_and_momentum(slides: dict[str, bool]) -> None:
+    """And do not rise; those that stick do not move."""
+    linkage = load_robot("sc618").linkage
+    feet = ["toe_1", "toe_4"]
+    compiled = Compiled(linkage, feet, slides)
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        q, rates = rng.uniform(-1.5, 1.5, 12), rng.normal(0, 2, 12)
+        torques = rng.normal(0, 5, 8)
+        jacobian = linkage.foot_jacobian(q, feet)
+        kept = [row for i, foot in enumerate(feet) for row in (2 * i, 2 * i + 1)
+                if row % 2 or foot not in slides]  # fmt: skip
+        rates -= np.linalg.pinv(jacobian[kept]) @ (jacobian[kept] @ rates)
+        anchors = np.array([linkage.foot(q, name) for name in feet]).ravel()
+        here = absolute(linkage, q), absolute(linkage, rates)
+        accelerations, forces = compiled(*here, torques, anchors)
+        moved = np.linalg.solve(linkage.to_absolute, accelerations)
+        inertia = linkage.mass_matrix(q) @ moved + passive_forces(linkage, q, rates)
+        given = linkage.actuation @ torques + jacobian.T @ forces.ravel()
+        np.testing.assert_allclose(inertia, given, atol=1e-10 * np.abs(forces).max())
+        drift = jacobian @ moved + linkage.foot_bias(q, rates, feet)
+        assert np.abs(drift[kept]).max() <= 1e-10 * np.abs(accelerations).max()
+        for foot, forward in slides.items():
+            tangent, normal = forces[feet.index(foot)]
+            assert tangent == pytest.approx((-1 if forward else 1) * FRICTION * normal)
+
+
+def test_drift_of_a_foot_dies_away() -> None:
+    """Off its anchor by e and moving by v, it accelerates by -2 w v - w^2 e."""
+    linkage = load_robot("sc618").linkage
+    compiled = Compiled(linkage, ["toe_2"])
+    rng = np.random.default_rng(5)
+    q, rates = rng.uniform(-1.5, 1.5, 12), rng.normal(0, 2, 12)
+    off = np.array([1e-3, -2e-3])
+    place = linkage.foot(q, "toe_2")
+    here = absolute(linkage, q), absolute(linkage, rates)
+    accelerations, _ = compiled(*here, np.zeros(8), place - off)
+    moved = np.linalg.solve(linkage.to_absolute, accelerations)
+    jacobian = linkage.foot_jacobian(q, ["toe_2"])
+    found = jacobian @ moved + linkage.foot_bias(q, rates, ["toe_2"])
+    expected = -2 * SETTLING * (jacobian @ rates) - SETTLING**2 * off
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 def test_one_build_serves_robots_of_other_numbers() -> None:
@@ -102,7 +159,8 @@ def test_a_robot_pinned_by_one_foot_keeps_its_energy_and_its_foot() -> None:
     """Without a damper; let go from a crouch it swings wildly for ten seconds."""
     linkage = load_robot("sc618", {"spine.damping": 0}).linkage
     motion = LinkageMotion(linkage)
-    definitions, accelerations, _ = motion.stance(["toe_1"], {})
+    toe = Standing("toe_1", (sp.S.Zero, sp.S.Zero))
+    definitions, accelerations, _ = motion.stance([toe], {})
     inputs = [*motion.coordinates, *motion.rates]
     variables = [hy.expression(f"v{i}") for i in range(24)]
     known = dict(zip(inputs, variables, strict=True))

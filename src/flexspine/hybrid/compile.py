@@ -43,7 +43,7 @@ class Jump:
     A guard that does not act is a mere marker, such as a section may use.
     ``value`` and ``rate`` are the guard itself; ``states`` and ``held`` the point after the jump,
     ``guards`` the guards of the target mode there, value and rate in turn, of which ``due`` may
-    fire at the same instant.
+    fire at the same instant. Guards that are decided in numbers have none of this.
     """
 
     guard: Guard
@@ -78,7 +78,7 @@ class CompiledMode:
         self.coefficients = coefficients
         self.kernel = kernel
         self.jumps = jumps
-        self.guards = slice(0, 2 * len(jumps))
+        self.guards = slice(0, 2 * len(_in_kernel(mode)))
         self.by_name = {jump.guard.name: jump for jump in jumps}
         self.due_here = _due(mode, mode)
         self.n_inputs, self.n_answers = kernel.nparams, kernel.nouts
@@ -132,7 +132,9 @@ class CompiledSystem:
             for guard in mode.guards
         ]
         start = [0.0] * len(system.states)
-        integrator = hy.taylor_adaptive(field, start, tol=self.tolerance, t_events=events)
+        integrator = hy.taylor_adaptive(
+            field, start, tol=self.tolerance, t_events=events, compact_mode=system.large
+        )
         kernel, jumps = self._event_kernel(mode)
         coefficients = self.coefficients(lower.coefficients)
         return CompiledMode(mode, integrator, coefficients, kernel, jumps)
@@ -147,8 +149,10 @@ class CompiledSystem:
         system = self.system
         n, m = len(system.states), len(system.held)
         outputs = self._guards_and_rates(mode, {**self._states, **self._held})
+        places = {guard.name: i for i, guard in enumerate(_in_kernel(mode))}
         jumps: list[Jump] = []
-        for i, guard in enumerate(mode.guards):
+        for guard in mode.guards:
+            i = places.get(guard.name, 0)
             target = system.mode(guard.target or mode.name)
             at = len(outputs)
             if guard.jumps:
@@ -157,7 +161,7 @@ class CompiledSystem:
             jumps.append(
                 Jump(
                     guard=guard,
-                    acts=guard.jumps or guard.ends is not None,
+                    acts=guard.jumps or guard.ends is not None or guard.decide is not None,
                     target=target.name,
                     value=2 * i,
                     rate=2 * i + 1,
@@ -196,7 +200,7 @@ class CompiledSystem:
         return self._and_rates(mode, expressions, now), self._variables
 
     def _guards_and_rates(self, mode: Mode, at: Mapping[sp.Symbol, Any]) -> list[Any]:
-        return self._and_rates(mode, [guard.expression for guard in mode.guards], at)
+        return self._and_rates(mode, [guard.expression for guard in _in_kernel(mode)], at)
 
     def _and_rates(
         self, mode: Mode, expressions: list[sp.Expr], at: Mapping[sp.Symbol, Any]
@@ -224,11 +228,16 @@ def compile_expressions(outputs: list[Any], variables: list[Any]) -> Any:
     return hy.cfunc(outputs or [hy.expression(0.0)], vars=variables or [hy.expression("unused")])
 
 
+def _in_kernel(mode: Mode) -> list[Guard]:
+    """The guards that the event kernel answers for."""
+    return [guard for guard in mode.guards if guard.decide is None]
+
+
 def _due(mode: Mode, before: Mode) -> tuple[Due, ...]:
     active = {guard.name for guard in before.guards}
     return tuple(
         Due(i, guard.name, guard.name in active, guard.arming is Arming.LEVEL)
-        for i, guard in enumerate(mode.guards)
+        for i, guard in enumerate(_in_kernel(mode))
         if guard.jumps or guard.ends
     )
 

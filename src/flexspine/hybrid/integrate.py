@@ -20,7 +20,7 @@ from flexspine.hybrid.outcome import (
     Outcome,
     OutcomeKind,
 )
-from flexspine.hybrid.system import Section
+from flexspine.hybrid.system import Guard, Section
 from flexspine.hybrid.trajectory import Arc, Event, HybridState, Trajectory
 
 # s; guards that fire closer together than this are one event.
@@ -221,18 +221,38 @@ class _Run:
         crossed = guard.name in self.section.guards and self._may_cross()
         if not (crossed or jump.acts):
             return False
+        if guard.decide is not None:
+            return self._decide(guard)
         self.instant, self.fired = self.time, [guard.name]
         before = self.mode
         if jump.acts:
             values = mode.evaluate(self.states, self.held)
-            if guard.ends is None and (kind := self._doubt(guard.name, values[jump.rate])):
-                self.outcome = Outcome(kind, f"{guard.name} at t = {self.time:.9g} s")
+            if guard.ends is None and self._in_doubt(guard, values[jump.rate]):
                 return True
             crossed = crossed or self._section_is_due(mode, values)
             self._fire(jump, values)
         if crossed:
             self._cross()
         self._note(tuple(self.fired), before)
+        return True
+
+    def _decide(self, guard: Guard) -> bool:
+        """Let a guard fire whose jump is computed in numbers."""
+        assert guard.decide is not None
+        found = guard.decide(self.bound, self._here())
+        if found is None:
+            return False
+        self.instant, self.fired = self.time, [guard.name]
+        if self._in_doubt(guard, -inf):
+            return True
+        if isinstance(found, Outcome):
+            self.outcome = found
+            return True
+        before = self.mode
+        _, self.mode, self.states, self.held = found
+        self._note((guard.name,), before)
+        mode = self.bound.mode(self.mode)
+        self._settle(mode, mode.evaluate(self.states, self.held))
         return True
 
     def _may_cross(self) -> bool:
@@ -293,6 +313,8 @@ class _Run:
         values = mode.evaluate(self.states, self.held)
         numbers = values[mode.code.guards].tolist()
         for jump in mode.code.jumps:
+            if jump.guard.decide is not None or jump.guard.timed:
+                continue
             touching = -ZERO <= numbers[jump.value] <= ZERO
             if touching and jump.guard.jumps and abs(numbers[jump.rate]) < GRAZING_RATE:
                 self.outcome = Outcome(GRAZED, f"{jump.guard.name} at the start")
@@ -315,6 +337,13 @@ class _Run:
         """Note an event."""
         self.events.append(Event(names, before, self._here()))
         self.firings.append(Firing(self.time, names))
+
+    def _in_doubt(self, guard: Guard, rate: float) -> bool:
+        """Whether the run has to end at an event that is no proper one."""
+        kind = None if guard.timed else self._doubt(guard.name, rate)
+        if kind is not None:
+            self.outcome = Outcome(kind, f"{guard.name} at t = {self.time:.9g} s")
+        return kind is not None
 
     def _doubt(self, name: str, rate: float) -> OutcomeKind | None:
         """Tell a grazing or a chattering event from a proper one."""

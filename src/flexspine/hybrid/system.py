@@ -10,10 +10,18 @@ from dataclasses import dataclass
 from dataclasses import field as default
 from enum import Enum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from flexspine.hybrid.outcome import OutcomeKind
+from flexspine.hybrid.outcome import Outcome, OutcomeKind
+
+if TYPE_CHECKING:
+    from flexspine.hybrid.compile import BoundSystem
+    from flexspine.hybrid.trajectory import HybridState
+
+# From where a guard fired to where the run goes on, or how it ends; None: nothing happens.
+Decision = Callable[["BoundSystem", "HybridState"], "HybridState | Outcome | None"]
 
 
 class Arming(Enum):
@@ -31,7 +39,10 @@ class Guard:
     """An event: it happens when ``expression`` falls through zero.
 
     ``target`` is the next mode (None: the same), ``resets`` the new values of states and held
-    variables (those not named stay), ``ends`` the outcome if the event ends the run.
+    variables (those not named stay), ``ends`` the outcome if the event ends the run. Instead of
+    these, ``decide`` may compute in numbers what happens; it answers for every other decided guard
+    that is due at the same instant. ``timed`` guards are clocks: however often they fire, and
+    however slowly they are crossed, nothing is wrong.
     """
 
     name: str
@@ -40,10 +51,12 @@ class Guard:
     resets: Mapping[sp.Symbol, sp.Expr] = default(default_factory=dict)
     arming: Arming = Arming.CROSSING
     ends: OutcomeKind | None = None
+    decide: Decision | None = None
+    timed: bool = False
 
     @property
     def jumps(self) -> bool:
-        """Whether the guard changes the mode or any value."""
+        """Whether the guard changes the mode or any value, by expressions."""
         return self.target is not None or bool(self.resets)
 
 
@@ -104,7 +117,9 @@ class HybridSystem:
 
     ``states`` flow, ``held`` variables change only at events, ``parameters`` not at all during a
     run. ``mode`` builds the named mode when it is first needed. ``tracked`` names observables
-    whose largest values are worth keeping of a run of which nothing else is kept.
+    whose largest values are worth keeping of a run of which nothing else is kept. ``large``
+    systems, of a thousand terms and more, are compiled as functions that call each other, which
+    takes seconds instead of minutes.
     """
 
     name: str
@@ -116,6 +131,7 @@ class HybridSystem:
     section: Section
     reversal: Reversal | None = None
     tracked: tuple[str, ...] = ()
+    large: bool = False
 
     @cached_property
     def places(self) -> dict[sp.Symbol, int]:

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import sympy as sp
 
-from flexspine.mechanics.elimination import solve_symmetric
+from flexspine.mechanics.elimination import solve
 
 Definitions = Mapping[sp.Symbol, sp.Expr]
 
@@ -93,7 +93,7 @@ class Lagrangian:
             force - bias
             for force, bias in zip(self.generalized_forces, self.velocity_forces, strict=True)
         ]
-        definitions, (solution,) = solve_symmetric(self.mass_matrix, [right])
+        definitions, (solution,) = solve(self.mass_matrix, [right])
         return definitions, solution
 
     def _d(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:

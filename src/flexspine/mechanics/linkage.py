@@ -93,11 +93,16 @@ class Linkage:
         return chains
 
     @cached_property
-    def _to_absolute(self) -> Array:
+    def to_absolute(self) -> Array:
         """Absolute angles and the base from ``q``, shape (N, N)."""
         whole = np.eye(self.size)
         whole[:-2, :-2] = self._chains
         return whole
+
+    @cached_property
+    def to_relative(self) -> Array:
+        """``q`` from absolute angles and the base, shape (N, N)."""
+        return np.rint(np.linalg.inv(self.to_absolute))
 
     def arms(self, link: str, distance: float) -> Array:
         """The lever arms of a point on a link, at a distance from its start, shape (n,)."""
@@ -166,7 +171,7 @@ class Linkage:
         matrix[..., :n, n] = matrix[..., n, :n] = -self.moments * np.sin(angles)
         matrix[..., :n, n + 1] = matrix[..., n + 1, :n] = self.moments * np.cos(angles)
         matrix[..., n, n] = matrix[..., n + 1, n + 1] = self.mass
-        result: Array = self._to_absolute.T @ matrix @ self._to_absolute
+        result: Array = self.to_absolute.T @ matrix @ self.to_absolute
         return result
 
     def velocity_forces(self, q: Array, rates: Array) -> Array:
@@ -176,7 +181,7 @@ class Linkage:
         torques = ((self.inertias * apart) @ squares[..., None])[..., 0]
         push = -np.stack([np.cos(angles), np.sin(angles)], axis=-2) * self.moments
         base = (push @ squares[..., None])[..., 0]
-        result: Array = np.concatenate([torques, base], axis=-1) @ self._to_absolute
+        result: Array = np.concatenate([torques, base], axis=-1) @ self.to_absolute
         return result
 
     def potential_forces(self, q: Array) -> Array:
@@ -184,7 +189,7 @@ class Linkage:
         weights = np.zeros(q.shape)
         weights[..., :-2] = self.gravity * self.moments * np.cos(self.angles(q))
         weights[..., -1] = self.gravity * self.mass
-        forces: Array = weights @ self._to_absolute
+        forces: Array = weights @ self.to_absolute
         for joint in self.joints:
             number = self.place[joint.name]
             forces[..., number] += joint.stiffness * (q[..., number] - joint.rest)
@@ -204,17 +209,24 @@ class Linkage:
         result: Array = np.eye(self.size)[:, columns]
         return result
 
+    def point_jacobian(self, q: Array, link: str, distance: float) -> Array:
+        """The velocity of a point of a link by ``q'``, shape (..., 2, N)."""
+        return self._jacobian(q, [self.arms(link, distance)])
+
     def foot_jacobian(self, q: Array, feet: Iterable[str]) -> Array:
         """``J``, the velocities of feet by ``q'``: x and y in turn, shape (..., 2 feet, N)."""
+        return self._jacobian(q, [self.foot_arms(name) for name in feet])
+
+    def _jacobian(self, q: Array, points: list[Array]) -> Array:
+        """The velocities of points with these lever arms."""
         angles = self.angles(q)
         rows = []
-        for name in (feet := list(feet)):
-            arms = self.foot_arms(name)
+        for arms in points:
             for column, turned in enumerate((-arms * np.sin(angles), arms * np.cos(angles))):
                 base = np.broadcast_to(np.eye(2)[column], (*q.shape[:-1], 2))
                 rows.append(np.concatenate([turned, base], axis=-1))
-        whole = np.array(rows).reshape(2 * len(feet), *q.shape[:-1], self.size)
-        result: Array = np.moveaxis(whole, 0, -2) @ self._to_absolute
+        whole = np.array(rows).reshape(2 * len(points), *q.shape[:-1], self.size)
+        result: Array = np.moveaxis(whole, 0, -2) @ self.to_absolute
         return result
 
     def foot_bias(self, q: Array, rates: Array, feet: Iterable[str]) -> Array:

@@ -14,10 +14,14 @@ from functools import cached_property
 
 import sympy as sp
 
-from flexspine.mechanics.elimination import solve_symmetric
+from flexspine.mechanics.elimination import solve
 from flexspine.mechanics.linkage import Linkage
 
 Point = tuple[sp.Expr, sp.Expr]
+Row = list[sp.Expr]
+
+# 1/s; how fast rounding errors of a foot's place die away. Where there are none it does nothing.
+SETTLING = 30
 
 
 def _symbol(name: str) -> sp.Symbol:
@@ -25,14 +29,25 @@ def _symbol(name: str) -> sp.Symbol:
 
 
 @dataclass(frozen=True)
+class Standing:
+    """A foot on the ground: it keeps to its ``anchor``, or slides over it, forward or not."""
+
+    name: str
+    anchor: Point
+    slides: bool | None = None
+
+
+@dataclass(frozen=True)
 class LinkageMotion:
     """A linkage in symbols.
 
     ``coordinates`` are angles by link and then the base's ``x`` and ``y``; ``rates`` theirs.
-    ``values`` gives every other symbol's value for the linkage it was made of.
+    ``values`` gives every other symbol's value for the linkage it was made of, and for its
+    ``friction`` on the ground.
     """
 
     linkage: Linkage
+    friction: float = 0.0
     values: dict[sp.Symbol, float] = field(default_factory=dict)
 
     @cached_property
@@ -109,9 +124,23 @@ class LinkageMotion:
             found[p] -= torque
         return found
 
+    def bend_rate(self, joint: str) -> sp.Expr:
+        """How fast a joint bends."""
+        child, parent = self._sides(next(j for j in self.linkage.joints if j.name == joint).link)
+        return self.rates[child] - self.rates[parent]
+
     def foot(self, name: str) -> Point:
         """Where a foot is."""
-        arms = self._arms(name)
+        return self._place(self._arms(name))
+
+    def point(self, name: str, link: str, distance: float) -> Point:
+        """Where a point of a link is, at a distance from its start, under a name of its own."""
+        links = self.linkage.links
+        arms = self.linkage.arms(link, distance)
+        named = {j: self.parameter(f"{name}_arm_{links[j].name}", a) for j, a in enumerate(arms)}
+        return self._place({j: arm for j, arm in named.items() if arm != 0})
+
+    def _place(self, arms: Mapping[int, sp.Expr]) -> Point:
         x, y = self.coordinates[-2:]
         return (
             x + sum((arm * self._of(j)[1] for j, arm in arms.items()), sp.S.Zero),
@@ -133,39 +162,90 @@ class LinkageMotion:
             bias += pull
         return rows, bias
 
-    def stance(
-        self, feet: Sequence[str], torques: Mapping[str, sp.Expr]
-    ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr], list[sp.Expr]]:
-        """Move with some feet that stay where they are.
+    def foot_velocity(self, name: str) -> Point:
+        """How fast a foot moves."""
+        rows, _ = self.foot_rows([name])
+        x, y = rows * sp.Matrix(self.rates)
+        return x, y
 
-        Returns definitions in order, accelerations of `coordinates` and the forces on the feet, x
-        and y in turn.
+    def stance(
+        self, feet: Sequence[Standing], torques: Mapping[str, sp.Expr]
+    ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr], dict[str, Point]]:
+        """Move with some feet on the ground.
+
+        Returns definitions in order, accelerations of `coordinates` and the forces on the feet.
         """
-        rows, bias = self.foot_rows(feet)
+        held, pushes, needed = self._contacts(feet)
         order = list(range(len(self.coordinates)))[::-1]
         order = [*order[2:], *sorted(order[:2])]  # from the ends of the tree to the base
         matrix = self.mass_matrix().extract(order, order)
         free = self.forces(torques)
-        columns = [[free[i] for i in order]]
-        columns += [[rows[r, i] for i in order] for r in range(rows.rows)]
-        definitions, solved = solve_symmetric(matrix, columns, "whole_")
+        columns = [[row[i] for i in order] for row in (free, *pushes)]
+        definitions, solved = solve(matrix, columns, "whole_")
         back = [order.index(i) for i in range(len(order))]
         alone, *spread = ([column[i] for i in back] for column in solved)
         if not feet:
-            return {**self.definitions, **definitions}, alone, []
-        count = rows.rows
-        response = sp.Matrix(
-            count, count, lambda i, j: sum(rows[i, c] * spread[j][c] for c in range(len(order)))
-        )
-        needed = [
-            -bias[i] - sum(rows[i, c] * alone[c] for c in range(len(order))) for i in range(count)
-        ]
-        more, (forces,) = solve_symmetric(response, [needed], "feet_")
+            return {**self.definitions, **definitions}, alone, {}
+        count = len(held)
+        response = sp.Matrix(count, count, lambda i, j: _dot(held[i], spread[j]))
+        missing = [needed[i] - _dot(held[i], alone) for i in range(count)]
+        sticks = all(foot.slides is None for foot in feet)
+        more, (sizes,) = solve(response, [missing], "feet_", symmetric=sticks)
         accelerations = [
-            alone[c] + sum(spread[r][c] * forces[r] for r in range(count))
-            for c in range(len(order))
+            alone[c] + sum(spread[r][c] * sizes[r] for r in range(count)) for c in range(len(order))
         ]
-        return {**self.definitions, **definitions, **more}, accelerations, list(forces)
+        forces = self._forces_on(feet, sizes)
+        return {**self.definitions, **definitions, **more}, accelerations, forces
+
+    def _contacts(
+        self, feet: Sequence[Standing]
+    ) -> tuple[list[Row], list[Row], list[sp.Expr]]:
+        """What contacts hold, where they push, and the accelerations that they keep there.
+
+        Nothing moves where a contact holds; what rounding brings there dies away.
+        """
+        held: list[Row] = []
+        pushes: list[Row] = []
+        needed: list[sp.Expr] = []
+        for foot in feet:
+            rows, bias = self.foot_rows([foot.name])
+            along, up = list(rows.row(0)), list(rows.row(1))
+            if foot.slides is None:
+                held += [along, up]
+                pushes += [along, up]
+                kept = (0, 1)
+            else:
+                # Friction on a foot that slides forward points back.
+                way = -1 if foot.slides else 1
+                friction = self.parameter("friction", self.friction)
+                held.append(up)
+                pushes.append([n + way * friction * t for n, t in zip(up, along, strict=True)])
+                kept = (1,)
+            settling = self.settling(foot)
+            needed += [settling[axis] - bias[axis] for axis in kept]
+        return held, pushes, needed
+
+    def settling(self, foot: Standing) -> Point:
+        """The acceleration that takes a foot back to its anchor, from which rounding moved it."""
+        (x, y), (x_rate, y_rate) = self.foot(foot.name), self.foot_velocity(foot.name)
+        off = x - foot.anchor[0], y - foot.anchor[1]
+        return (
+            -2 * SETTLING * x_rate - SETTLING**2 * off[0],
+            -2 * SETTLING * y_rate - SETTLING**2 * off[1],
+        )
+
+    def _forces_on(self, feet: Sequence[Standing], sizes: Sequence[sp.Expr]) -> dict[str, Point]:
+        """The forces on feet from the sizes of their pushes."""
+        forces: dict[str, Point] = {}
+        rest = list(sizes)
+        for foot in feet:
+            if foot.slides is None:
+                forces[foot.name], rest = (rest[0], rest[1]), rest[2:]
+            else:
+                way = -1 if foot.slides else 1
+                forces[foot.name] = way * self.parameter("friction", self.friction) * rest[0], rest[0]
+                rest = rest[1:]
+        return forces
 
     def _base(self, names: str) -> tuple[sp.Symbol, ...]:
         return tuple(_symbol(name) for name in names.split())
@@ -199,3 +279,7 @@ class LinkageMotion:
         parent = self.linkage.links[number].parent
         assert parent is not None
         return number, self.linkage.place[parent]
+
+
+def _dot(row: Row, column: Sequence[sp.Expr]) -> sp.Expr:
+    return sum((a * b for a, b in zip(row, column, strict=True)), sp.S.Zero)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexspine.mechanics.complementarity import Contact, Resolution, resolve
 from flexspine.mechanics.linkage import Array, Linkage
 
 
@@ -64,6 +65,27 @@ def tracked(
     needed = np.concatenate([-linkage.foot_bias(q, rates, feet), wanted])
     solved = _solve(linkage, q, held, -passive_forces(linkage, q, rates), needed)
     return Tracked(solved[:n], solved[n : n + k].reshape(-1, 2), solved[n + k :])
+
+
+def supported(
+    linkage: Linkage,
+    q: Array,
+    rates: Array,
+    feet: Sequence[str],
+    torques: Array,
+    friction: float,
+    moving: Sequence[Contact | None],
+) -> Resolution:
+    """Find what feet on the ground do next: which of them lift off, stick or begin to slide.
+
+    ``moving`` names those that slide already. The pushes are forces in N.
+    """
+    jacobian = linkage.foot_jacobian(q, feet)
+    applied = linkage.actuation @ torques - passive_forces(linkage, q, rates)
+    columns = np.concatenate([jacobian.T, applied[:, None]], axis=1)
+    solved = np.linalg.solve(linkage.mass_matrix(q), columns)
+    free = jacobian @ solved[:, -1] + linkage.foot_bias(q, rates, feet)
+    return resolve(jacobian @ solved[:, :-1], free, friction, moving)
 
 
 def _solve(linkage: Linkage, q: Array, held: Array, applied: Array, needed: Array) -> Array:

@@ -1,0 +1,149 @@
+"""The motion of a planar linkage whose motors' angles accelerate as wanted, in symbols.
+
+With the motors' accelerations given, only the first link, the joints without motor and the base
+are left to move. Their equations know no motors: ``P^T (D a + ...) = P^T J^T F`` with the columns
+``P`` of those coordinates. With two feet of different hips on the ground these are as many as the
+contacts hold, and the motion is a matter of kinematics alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from flexspine.mechanics.elimination import solve
+from flexspine.mechanics.linkage import Linkage
+from flexspine.mechanics.linkage_motion import LinkageMotion, Point, Standing
+
+
+@dataclass(frozen=True)
+class TrackedMotion:
+    """Accelerations of the motion's coordinates, forces by foot and torques by joint.
+
+    All in terms of ``definitions``, in their order. ``closeness`` vanishes where the feet and a
+    joint without motor are in line, so that torques are unbounded; it is None where that cannot
+    be.
+    """
+
+    definitions: dict[sp.Symbol, sp.Expr]
+    accelerations: list[sp.Expr]
+    forces: dict[str, Point]
+    torques: dict[str, sp.Expr]
+    closeness: sp.Expr | None
+
+
+def follow(
+    motion: LinkageMotion, feet: Sequence[Standing], wanted: Mapping[str, sp.Expr]
+) -> TrackedMotion:
+    """Find the torques with which motors accelerate as ``wanted``, and what else happens.
+
+    Raises `ValueError` where feet hold what the motors are to move: more than two of them, or two
+    at the same hip.
+    """
+    linkage = motion.linkage
+    free = _free_columns(linkage)
+    count = len(free)
+    if 2 * len(feet) > count or any(foot.slides is not None for foot in feet):
+        raise ValueError(f"{len(feet)} feet hold what the motors are to move")
+    definitions = dict(motion.definitions)
+    given: list[sp.Expr] = []
+    for number, link in enumerate(linkage.links):
+        driven = [wanted[name] for name in _on_the_way(linkage, number) if name in wanted]
+        symbol = sp.Symbol(f"given_{link.name}", real=True)
+        definitions[symbol] = sum(driven, sp.S.Zero)
+        given.append(symbol if driven else sp.S.Zero)
+    given += [sp.S.Zero, sp.S.Zero]
+    matrix, applied = motion.mass_matrix(), motion.forces({})
+    size = len(given)
+    left = [applied[i] - sum(matrix[i, j] * given[j] for j in range(size)) for i in range(size)]
+    order = list(range(count))[::-1]  # the base first, which couples to all the same way
+    shares = [free[p] for p in order]
+    small = sp.Matrix(
+        count,
+        count,
+        lambda i, j: sum(matrix[a, b] for a in shares[i] for b in shares[j]),
+    )
+    rows, bias = motion.foot_rows([foot.name for foot in feet])
+    held = [[sum(rows[r, a] for a in share) for share in shares] for r in range(rows.rows)]
+    closeness = _closeness(held, order)
+    if closeness == 0:
+        raise ValueError("2 feet at one hip hold what the motors are to move")
+    columns = [[sum(left[a] for a in share) for share in shares], *held]
+    more, (alone, *spread) = solve(small, columns, "free_")
+    definitions |= more
+    needed = []
+    for number, foot in enumerate(feet):
+        settling = motion.settling(foot)
+        for axis in range(2):
+            r = 2 * number + axis
+            course = sum(rows[r, j] * given[j] for j in range(size))
+            needed.append(settling[axis] - bias[r] - course - _dot(held[r], alone))
+    sizes: Sequence[sp.Expr] = ()
+    if feet:
+        response = sp.Matrix(len(held), len(held), lambda i, j: _dot(held[i], spread[j]))
+        more, (sizes,) = solve(response, [needed], "feet_")
+        definitions |= more
+    moves = [
+        alone[i] + sum(spread[r][i] * sizes[r] for r in range(len(held))) for i in range(count)
+    ]
+    accelerations: list[sp.Expr] = []
+    for number, coordinate in enumerate(motion.coordinates):
+        symbol = sp.Symbol(f"{coordinate.name}_acceleration", real=True)
+        definitions[symbol] = given[number] + sum(
+            move for move, share in zip(moves, shares, strict=True) if number in share
+        )
+        accelerations.append(symbol)
+    missing: list[sp.Expr] = []
+    for i in range(len(linkage.links)):
+        symbol = sp.Symbol(f"missing_{linkage.links[i].name}", real=True)
+        definitions[symbol] = (
+            sum(matrix[i, j] * accelerations[j] for j in range(size))
+            - applied[i]
+            - sum(rows[r, i] * sizes[r] for r in range(len(held)))
+        )
+        missing.append(symbol)
+    torques = {}
+    for name in wanted:
+        symbol = sp.Symbol(f"torque_{name}", real=True)
+        definitions[symbol] = sum(
+            missing[i] for i in range(len(linkage.links)) if name in _on_the_way(linkage, i)
+        )
+        torques[name] = symbol
+    forces = {foot.name: (sizes[2 * i], sizes[2 * i + 1]) for i, foot in enumerate(feet)}
+    return TrackedMotion(definitions, accelerations, forces, torques, closeness)
+
+
+def _free_columns(linkage: Linkage) -> list[list[int]]:
+    """Which absolute coordinates each coordinate without motor moves, the base last."""
+    n = len(linkage.links)
+    passive = [joint.name for joint in linkage.joints if not joint.actuated]
+    columns = [list(range(n))]
+    columns += [[i for i in range(n) if name in _on_the_way(linkage, i)] for name in passive]
+    return [*columns, [n], [n + 1]]
+
+
+def _on_the_way(linkage: Linkage, number: int) -> set[str]:
+    """The joints between the first link and another."""
+    joints = {joint.link: joint.name for joint in linkage.joints}
+    found = set()
+    link = linkage.links[number]
+    while link.parent is not None:
+        if link.name in joints:
+            found.add(joints[link.name])
+        link = linkage.links[linkage.place[link.parent]]
+    return found
+
+
+def _closeness(held: list[list[sp.Expr]], order: list[int]) -> sp.Expr | None:
+    """The determinant of what two feet hold of the coordinates without motor."""
+    if len(held) != len(order):
+        return None
+    angles = [i for i, p in enumerate(order) if p < len(order) - 2]
+    apart = sp.Matrix(2, 2, lambda i, j: held[2 + i][angles[j]] - held[i][angles[j]])
+    return apart.det()
+
+
+def _dot(row: Sequence[sp.Expr], column: Sequence[sp.Expr]) -> sp.Expr:
+    return sum((a * b for a, b in zip(row, column, strict=True)), sp.S.Zero)

@@ -1,0 +1,434 @@
+"""A planar robot on flat ground as a hybrid system.
+
+Its modes are footings: which feet touch the ground, and which of those slide. A foot lands when it
+comes down to the ground: a plastic impact with friction (`flexspine.mechanics.impact`). It lifts
+off when its normal force falls through zero, begins to slide when the tangential one leaves the
+friction cone, and stops sliding when its velocity falls through zero. Whenever forces jump, at
+impacts and when a controller changes its mind, what every touching foot does next is found anew
+(`flexspine.mechanics.stance.supported`). What turns the motors is a `Drive`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache, partial
+
+import numpy as np
+import sympy as sp
+
+from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.outcome import Outcome, OutcomeKind
+from flexspine.hybrid.system import Guard, HybridSystem, Mode, Section
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.mechanics.complementarity import Contact, Verdict
+from flexspine.mechanics.impact import Impact, impact
+from flexspine.mechanics.linkage import Linkage
+from flexspine.mechanics.linkage_motion import LinkageMotion, Point, Standing
+from flexspine.mechanics.stance import supported
+from flexspine.models.bounder import FELL
+from flexspine.models.drive import Drive, Moment, Turning
+from flexspine.models.footing import Footing
+from flexspine.models.robot import Robot
+
+CLOCK, WORK, DISSIPATED = sp.symbols("clock motor_work dissipated_energy", real=True)
+LOSS, PUSH_TIME = sp.symbols("impact_loss push_time", real=True)
+
+# N; contact forces may be out of their cones by this much, which is more than rounding errors, so
+# that a foot at the edge is found to leave it.
+SLACK = 1e-9
+
+# m/s; a foot that comes down more slowly has only just left.
+SLOWEST_LANDING = 1e-9
+
+# m/s; above the rounding errors of a foot that has just begun to slide.
+CREEP = 1e-12
+
+# s; feet that land closer together than this land at once.
+TOGETHER = 1e-12
+
+NO_SOLUTION = OutcomeKind(
+    "no_contact_solution",
+    "no combination of feet that stick, slide or let go obeys the laws of contact; allow sliding, "
+    "or change the friction or the state a little",
+)
+AMBIGUOUS = OutcomeKind(
+    "ambiguous_contact",
+    "several combinations of feet that stick, slide or let go obey the laws of contact, so what "
+    "follows is not determined; allow sliding, or change the friction or the state a little",
+)
+
+
+def anchor(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
+    """Where a foot came to rest on the ground."""
+    return sp.Symbol(f"anchor_x_{foot}", real=True), sp.Symbol(f"anchor_y_{foot}", real=True)
+
+
+def impulse(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
+    """The impulse on a foot at the latest impact, in N s."""
+    return sp.Symbol(f"impulse_x_{foot}", real=True), sp.Symbol(f"impulse_y_{foot}", real=True)
+
+
+@dataclass(frozen=True)
+class Push:
+    """A sudden push on the body: an impulse in N s on a link, at its centre of mass."""
+
+    time: float
+    impulse: tuple[float, float]
+    link: str
+
+
+@dataclass(frozen=True)
+class Build:
+    """What robots have in common that share their compiled equations; ``of`` is one of them."""
+
+    key: tuple[object, ...]
+    of: Robot = field(compare=False)
+
+    @classmethod
+    def like(cls, robot: Robot) -> Build:
+        """The build of a robot: its parts, and which of its numbers vanish."""
+        names = tuple(complete_motion(robot).values)
+        parts = (robot.parents, robot.joints, robot.feet)
+        return cls((*(tuple(part.items()) for part in parts), names), robot)
+
+
+def complete_motion(robot: Robot) -> LinkageMotion:
+    """The robot's mechanics in symbols, with every number that they may ever need."""
+    motion = LinkageMotion(robot.linkage, robot.friction)
+    motion.mass_matrix()
+    motion.forces({})
+    motion.foot_rows(list(robot.feet))
+    motion.parameter("friction", robot.friction)
+    for point in low_points(robot):
+        motion.point(*point)
+    return motion
+
+
+def low_points(robot: Robot) -> list[tuple[str, str, float]]:
+    """Joints and ends of links that must stay above the ground: name, link, distance on it."""
+    linkage = robot.linkage
+    links = {link.name: link for link in linkage.links}
+    first = linkage.links[0]
+    places = [(first.name, first.name, 0.0)]
+    for joint in linkage.joints:
+        child = links[joint.link]
+        assert child.parent is not None
+        places.append((joint.name, child.parent, child.at))
+    places += [(link.name, link.name, link.length) for link in linkage.links]
+    seen = [tuple(linkage.foot_arms(foot)) for foot in robot.feet]
+    found = []
+    for name, link, distance in places:
+        arms = tuple(linkage.arms(link, distance))
+        if arms not in seen:  # joints meet at hips, and feet may touch
+            seen.append(arms)
+            found.append((name, link, distance))
+    return found
+
+
+class BoundRobot(BoundSystem):
+    """A robot's compiled system with its numbers.
+
+    ``slides`` False: feet that touch at an impact stick or let go.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        drive: Drive,
+        tolerance: float,
+        *,
+        push: Push | None = None,
+        slides: bool = True,
+    ) -> None:
+        system = articulated_system(Build.like(robot), drive)
+        own = complete_motion(robot).values | drive.values(robot)
+        own[PUSH_TIME] = -1.0 if push is None else push.time
+        numbers = np.array([own[symbol] for symbol in system.parameters])
+        super().__init__(compile_system(system, tolerance), numbers)
+        self.robot, self.drive, self.push, self.slides = robot, drive, push, slides
+
+    @property
+    def linkage(self) -> Linkage:
+        """The mechanism."""
+        return self.robot.linkage
+
+    def moment(self, point: HybridState) -> Moment:
+        """What a drive needs to know of a point."""
+        n = self.linkage.size
+        held = dict(zip(self.system.held, point.held.tolist(), strict=True))
+        back = self.linkage.to_relative
+        q, rates = back @ point.states[:n], back @ point.states[n : 2 * n]
+        footing = Footing.named(point.mode.partition(" by ")[0])
+        return Moment(point.time, q, rates, footing, held)
+
+    def point(self, moment: Moment, states: Array) -> HybridState:
+        """The point of a moment; what else flows is that of ``states``."""
+        n, to = self.linkage.size, self.linkage.to_absolute
+        held = np.array([moment.held[symbol] for symbol in self.system.held])
+        new = np.concatenate([states[:n], to @ moment.rates, states[2 * n :]])
+        mode = moment.footing.name + self.drive.label(self.robot, moment)
+        return HybridState(moment.time, mode, new, held)
+
+    def start(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> HybridState:
+        """Begin at rest in time; feet within rounding error of the ground stand on it.
+
+        Raises `ValueError` if they cannot.
+        """
+        linkage = self.linkage
+        places = {foot: linkage.foot(q, foot) for foot in self.robot.feet}
+        low = [foot for foot, (_, y) in places.items() if abs(y) <= SLOWEST_LANDING]
+        values = dict.fromkeys(self.system.held, 0.0)
+        for foot, place in places.items():
+            values |= dict(zip(anchor(foot), place.tolist(), strict=True))
+        footing = Footing.of(dict.fromkeys(low, Contact.STICK), self.robot.feet)
+        moment = Moment(0.0, q, rates, footing, {**values, **held})
+        states = np.concatenate([linkage.to_absolute @ q, linkage.to_absolute @ rates, np.zeros(3)])
+        found = self.carry_on(moment, states)
+        if isinstance(found, Outcome):
+            raise ValueError(found.message)
+        return found
+
+    def carry_on(self, moment: Moment, states: Array) -> HybridState | Outcome:
+        """Go on after something jumped: find out what each touching foot does next."""
+        feet = moment.footing.feet
+        if feet:
+            torques = self.drive.torques_at(self, self.point(moment, states))
+            moving = [
+                None if does is Contact.STICK else does for _, does in moment.footing.contacts
+            ]
+            found = supported(
+                self.linkage, moment.q, moment.rates, feet, torques, self.robot.friction, moving
+            )
+            if found.verdict is Verdict.NONE:
+                return Outcome(NO_SOLUTION, f"{moment.footing.name} at t = {moment.time:.9g} s")
+            contacts = dict(zip(feet, found.contacts, strict=True))
+            moment = replace(moment, footing=Footing.of(contacts, self.robot.feet))
+        return self.point(moment, states)
+
+
+@lru_cache(maxsize=32)
+def articulated_system(build: Build, drive: Drive) -> HybridSystem:
+    """Assemble the hybrid system of all robots of one build with one kind of drive."""
+    robot = build.of
+    motion = complete_motion(robot)
+    held = [symbol for foot in robot.feet for symbol in (*anchor(foot), *impulse(foot))]
+    built: dict[str, Mode] = {}
+
+    def mode(name: str) -> Mode:
+        if name not in built:
+            built[name] = _Footed(robot, motion, drive, name).mode()
+        return built[name]
+
+    return HybridSystem(
+        name=f"{robot.name} {drive.name}",
+        states=(*motion.coordinates, *motion.rates, CLOCK, WORK, DISSIPATED),
+        held=(*held, LOSS, *drive.held(robot)),
+        parameters=(*motion.values, *drive.values(robot), PUSH_TIME),
+        modes=(),
+        mode=mode,
+        section=Section((), {}, {}, {}, FELL),
+        large=True,
+    )
+
+
+@dataclass(frozen=True)
+class _Footed:
+    """One mode in the making."""
+
+    robot: Robot
+    motion: LinkageMotion
+    drive: Drive
+    name: str
+
+    @cached_property
+    def footing(self) -> Footing:
+        return Footing.named(self.name.partition(" by ")[0])
+
+    @cached_property
+    def turning(self) -> Turning:
+        return self.drive.turning(self.robot, self.motion, self.name)
+
+    def mode(self) -> Mode:
+        motion, turning = self.motion, self.turning
+        definitions = {**motion.definitions, **turning.definitions}
+        accelerations, forces = turning.accelerations, turning.forces
+        if accelerations is None:
+            slides = {Contact.STICK: None, Contact.SLIDE_FORWARD: True, Contact.SLIDE_BACK: False}
+            feet = [Standing(f, anchor(f), slides[does]) for f, does in self.footing.contacts]
+            more, accelerations, forces = motion.stance(feet, turning.torques)
+            definitions |= more
+        n = len(motion.coordinates)
+        return Mode(
+            name=self.name,
+            definitions=definitions,
+            field={
+                **dict(zip(motion.coordinates, motion.rates, strict=True)),
+                **dict(zip(motion.rates, accelerations[:n], strict=True)),
+                CLOCK: sp.S.One,
+                WORK: self._motor_power(),
+                DISSIPATED: self._power_lost(forces),
+            },
+            guards=(
+                *(guard for foot in self.robot.feet for guard in self._contact(foot, forces)),
+                *self._falls(),
+                Guard("push", PUSH_TIME - CLOCK, decide=_pushed, timed=True),
+                *self.drive.guards(self.robot, self.name),
+            ),
+            observables={
+                **{f"torque_{name}": torque for name, torque in turning.torques.items()},
+                **{
+                    f"force_{axis}_{foot}": forces[foot][i] if foot in forces else sp.S.Zero
+                    for foot in self.robot.feet
+                    for i, axis in enumerate("xy")
+                },
+                **turning.observables,
+            },
+        )
+
+    def _motor_power(self) -> sp.Expr:
+        return sum(
+            (
+                torque * self.motion.bend_rate(name)
+                for name, torque in self.turning.torques.items()
+            ),
+            sp.S.Zero,
+        )
+
+    def _power_lost(self, forces: Mapping[str, Point]) -> sp.Expr:
+        """In dampers, and by feet that slide."""
+        lost = sp.S.Zero
+        for joint in self.robot.linkage.joints:
+            damping = self.motion.parameter(f"{joint.name}_damping", joint.damping)
+            lost += damping * self.motion.bend_rate(joint.name) ** 2
+        for foot, does in self.footing.contacts:
+            if does is not Contact.STICK:
+                lost -= forces[foot][0] * self.motion.foot_velocity(foot)[0]
+        return lost
+
+    def _contact(self, foot: str, forces: Mapping[str, Point]) -> list[Guard]:
+        """What ends a foot's contact, or brings it about."""
+        does = self.footing.does(foot)
+        if does is Contact.OPEN:
+            height = self.motion.foot(foot)[1]
+            return [Guard(f"{foot} touchdown", height, decide=partial(_landed, foot))]
+        tangent, normal = forces[foot]
+        opens = partial(_changed, foot, Contact.OPEN)
+        found = [Guard(f"{foot} lift-off", normal + SLACK, decide=opens)]
+        if does is Contact.STICK:
+            grip = self.motion.parameter("friction", self.robot.friction) * normal + SLACK
+            # A ground that pushes back lets the foot slide forward.
+            for way, slack in (
+                (Contact.SLIDE_FORWARD, grip + tangent),
+                (Contact.SLIDE_BACK, grip - tangent),
+            ):
+                slips = partial(_changed, foot, way)
+                found.append(Guard(f"{foot} begins to {way.value}", slack, decide=slips))
+            return found
+        speed = self.motion.foot_velocity(foot)[0]
+        on = speed if does is Contact.SLIDE_FORWARD else -speed
+        return [*found, Guard(f"{foot} stops sliding", on + CREEP, decide=partial(_stopped, foot))]
+
+    def _falls(self) -> list[Guard]:
+        return [
+            Guard(f"{name} at the ground", self.motion.point(name, link, at)[1], ends=FELL)
+            for name, link, at in low_points(self.robot)
+        ]
+
+
+Decided = HybridState | Outcome | None
+
+
+def _robot(bound: BoundSystem) -> BoundRobot:
+    assert isinstance(bound, BoundRobot)
+    return bound
+
+
+def _landed(foot: str, bound: BoundSystem, point: HybridState) -> Decided:
+    """A foot comes down: a plastic impact of all feet that touch."""
+    robot = _robot(bound)
+    moment, linkage = robot.moment(point), robot.linkage
+    down = {foot: _rise(linkage, moment, foot)}
+    if down[foot] > -SLOWEST_LANDING:
+        return None
+    for other in robot.robot.feet:
+        if moment.footing.does(other) is Contact.OPEN and other != foot:
+            rise = _rise(linkage, moment, other)
+            if rise < 0 and linkage.foot(moment.q, other)[1] <= -rise * TOGETHER:
+                down[other] = rise
+    touching = [each for each in robot.robot.feet if each in {*down, *moment.footing.feet}]
+    return _hit(robot, moment, point.states, touching, moment.rates, tuple(down))
+
+
+def _pushed(bound: BoundSystem, point: HybridState) -> Decided:
+    """Something hits the body, and with it the ground its feet."""
+    robot = _robot(bound)
+    push = robot.push
+    assert push is not None
+    moment, linkage = robot.moment(point), robot.linkage
+    link = linkage.links[linkage.place[push.link]]
+    along = linkage.point_jacobian(moment.q, link.name, link.com)
+    kick = np.linalg.solve(linkage.mass_matrix(moment.q), along.T @ np.array(push.impulse))
+    feet = list(moment.footing.feet)
+    return _hit(robot, moment, point.states, feet, moment.rates + kick, ())
+
+
+def _hit(
+    robot: BoundRobot,
+    moment: Moment,
+    states: Array,
+    feet: list[str],
+    rates: Array,
+    landed: tuple[str, ...],
+) -> Decided:
+    """Let feet hit the ground, and go on with what follows."""
+    friction = robot.robot.friction if robot.slides else None
+    found = impact(robot.linkage, moment.q, rates, feet, friction)
+    if found.verdict is not Verdict.ONE:
+        kind = NO_SOLUTION if found.verdict is Verdict.NONE else AMBIGUOUS
+        text = f"{found.solutions} at the impact of {', '.join(feet)} at t = {moment.time:.9g} s"
+        return Outcome(kind, text)
+    after = _after(robot, moment, feet, found, rates)
+    return robot.carry_on(robot.drive.after_impact(robot.robot, after, landed), states)
+
+
+def _after(
+    robot: BoundRobot, moment: Moment, feet: list[str], found: Impact, rates: Array
+) -> Moment:
+    """The moment after an impact, before a drive has its say."""
+    linkage, held = robot.linkage, dict(moment.held)
+    for name in robot.robot.feet:
+        held |= dict.fromkeys(impulse(name), 0.0)
+    for name, push in zip(feet, found.impulses, strict=True):
+        held |= dict(zip(impulse(name), push.tolist(), strict=True))
+    energies = [linkage.kinetic_energy(moment.q, each) for each in (rates, found.rates)]
+    held[LOSS] += float(energies[0] - energies[1])
+    footing = Footing.of(dict(zip(feet, found.contacts, strict=True)), robot.robot.feet)
+    for name in footing.feet:
+        if moment.footing.does(name) is not Contact.STICK:
+            place = linkage.foot(moment.q, name).tolist()
+            held |= dict(zip(anchor(name), place, strict=True))
+    return replace(moment, rates=found.rates, footing=footing, held=held)
+
+
+def _changed(foot: str, does: Contact, bound: BoundSystem, point: HybridState) -> Decided:
+    """A foot lifts off or begins to slide; no force jumps at that."""
+    robot = _robot(bound)
+    moment = robot.moment(point)
+    footing = moment.footing.but(foot, does, robot.robot.feet)
+    return robot.point(replace(moment, footing=footing), point.states)
+
+
+def _stopped(foot: str, bound: BoundSystem, point: HybridState) -> Decided:
+    """A foot comes to rest, or turns round."""
+    robot = _robot(bound)
+    moment = robot.moment(point)
+    place = robot.linkage.foot(moment.q, foot).tolist()
+    held = moment.held | dict(zip(anchor(foot), place, strict=True))
+    footing = moment.footing.but(foot, Contact.STICK, robot.robot.feet)
+    return robot.carry_on(replace(moment, footing=footing, held=held), point.states)
+
+
+def _rise(linkage: Linkage, moment: Moment, foot: str) -> float:
+    """How fast a foot rises, in m/s."""
+    return float(linkage.foot_jacobian(moment.q, [foot])[1] @ moment.rates)
