@@ -65,5 +65,5 @@ def test_feet_of_one_hip_and_three_feet_are_refused() -> None:
     standing = [Standing(name, (sp.S.Zero, sp.S.Zero)) for name in ("toe_1", "toe_2", "toe_3")]
     with pytest.raises(ValueError, match="3 feet hold"):
         follow(motion, standing, wanted)
-    with pytest.raises(ValueError, match="2 feet hold"):
+    with pytest.raises(ValueError, match="2 feet at one hip hold"):
         follow(motion, standing[:2], wanted)

@@ -115,7 +115,9 @@ class CompiledSystem:
             mode = self.system.mode(name)
             lower = self._plain(mode.definitions)
             function = compile_expressions(
-                [lower(expr) for expr in mode.observables.values()], self._variables
+                [lower(expr) for expr in mode.observables.values()],
+                self._variables,
+                large=self.system.large,
             )
             self._observables[name] = (tuple(mode.observables), function)
         names, function = self._observables[name]
@@ -223,9 +225,13 @@ class CompiledSystem:
         return Lowering({**self._states, **self._held, **self._raw}, (), definitions, 0)
 
 
-def compile_expressions(outputs: list[Any], variables: list[Any]) -> Any:
+def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool = False) -> Any:
     """Compile expressions; a function of nothing or to nothing gets one zero to work on."""
-    return hy.cfunc(outputs or [hy.expression(0.0)], vars=variables or [hy.expression("unused")])
+    return hy.cfunc(
+        outputs or [hy.expression(0.0)],
+        vars=variables or [hy.expression("unused")],
+        compact_mode=large,
+    )
 
 
 def _in_kernel(mode: Mode) -> list[Guard]:
@@ -323,3 +329,9 @@ class BoundSystem:
             bound = BoundMode(code, len(self.system.held), self.parameters)
             self._modes[name] = bound
         return bound
+
+    def observe(self, mode: str, states: Array, held: Array) -> dict[str, Array]:
+        """Evaluate the observables of a mode at states of shape (k, n), each shape (k,)."""
+        names, function = self.compiled.observables(mode)
+        parameters = np.concatenate([held, self.parameters])
+        return dict(zip(names, evaluate_columns(function, states, parameters), strict=True))

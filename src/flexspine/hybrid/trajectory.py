@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexspine.hybrid.compile import Array, BoundSystem, evaluate_columns
+from flexspine.hybrid.compile import Array, BoundSystem
 from flexspine.hybrid.outcome import Outcome
 
 
@@ -121,6 +121,4 @@ class Trajectory:
 
     def observe(self, arc: Arc, states: Array) -> dict[str, Array]:
         """Evaluate the observables of an arc's mode at states of shape (times, states)."""
-        names, function = self.bound.compiled.observables(arc.mode)
-        parameters = np.concatenate([arc.held, self.bound.parameters])
-        return dict(zip(names, evaluate_columns(function, states, parameters), strict=True))
+        return self.bound.observe(arc.mode, states, arc.held)

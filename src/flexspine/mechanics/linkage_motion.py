@@ -113,8 +113,7 @@ class LinkageMotion:
         found[n + 1] -= gravity * self.parameter("mass", self.linkage.mass)
         for joint in self.linkage.joints:
             k, p = self._sides(joint.link)
-            bend = self.coordinates[k] - self.coordinates[p]
-            rate = self.rates[k] - self.rates[p]
+            bend, rate = self.bend(joint.name), self.bend_rate(joint.name)
             torque = torques.get(joint.name, sp.S.Zero)
             if joint.stiffness:
                 rest = self.parameter(f"{joint.name}_rest", joint.rest)
@@ -124,9 +123,14 @@ class LinkageMotion:
             found[p] -= torque
         return found
 
+    def bend(self, joint: str) -> sp.Expr:
+        """The relative angle of a joint."""
+        child, parent = self._at(joint)
+        return self.coordinates[child] - self.coordinates[parent]
+
     def bend_rate(self, joint: str) -> sp.Expr:
         """How fast a joint bends."""
-        child, parent = self._sides(next(j for j in self.linkage.joints if j.name == joint).link)
+        child, parent = self._at(joint)
         return self.rates[child] - self.rates[parent]
 
     def foot(self, name: str) -> Point:
@@ -272,6 +276,10 @@ class LinkageMotion:
         links = self.linkage.links
         named = {j: self.parameter(f"{foot}_arm_{links[j].name}", a) for j, a in enumerate(found)}
         return {j: arm for j, arm in named.items() if arm != 0}
+
+    def _at(self, joint: str) -> tuple[int, int]:
+        """Positions of the links at a joint."""
+        return self._sides(next(each.link for each in self.linkage.joints if each.name == joint))
 
     def _sides(self, link: str) -> tuple[int, int]:
         """Positions of a link and of its parent."""

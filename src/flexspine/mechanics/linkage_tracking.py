@@ -51,7 +51,7 @@ def follow(
     given: list[sp.Expr] = []
     for number, link in enumerate(linkage.links):
         driven = [wanted[name] for name in _on_the_way(linkage, number) if name in wanted]
-        symbol = sp.Symbol(f"given_{link.name}", real=True)
+        symbol = sp.Symbol(f"law_given_{link.name}", real=True)
         definitions[symbol] = sum(driven, sp.S.Zero)
         given.append(symbol if driven else sp.S.Zero)
     given += [sp.S.Zero, sp.S.Zero]
@@ -71,7 +71,7 @@ def follow(
     if closeness == 0:
         raise ValueError("2 feet at one hip hold what the motors are to move")
     columns = [[sum(left[a] for a in share) for share in shares], *held]
-    more, (alone, *spread) = solve(small, columns, "free_")
+    more, (alone, *spread) = solve(small, columns, "law_")
     definitions |= more
     needed = []
     for number, foot in enumerate(feet):
@@ -83,21 +83,21 @@ def follow(
     sizes: Sequence[sp.Expr] = ()
     if feet:
         response = sp.Matrix(len(held), len(held), lambda i, j: _dot(held[i], spread[j]))
-        more, (sizes,) = solve(response, [needed], "feet_")
+        more, (sizes,) = solve(response, [needed], "law_feet_")
         definitions |= more
     moves = [
         alone[i] + sum(spread[r][i] * sizes[r] for r in range(len(held))) for i in range(count)
     ]
     accelerations: list[sp.Expr] = []
     for number, coordinate in enumerate(motion.coordinates):
-        symbol = sp.Symbol(f"{coordinate.name}_acceleration", real=True)
+        symbol = sp.Symbol(f"{coordinate.name}_wanted", real=True)
         definitions[symbol] = given[number] + sum(
             move for move, share in zip(moves, shares, strict=True) if number in share
         )
         accelerations.append(symbol)
     missing: list[sp.Expr] = []
     for i in range(len(linkage.links)):
-        symbol = sp.Symbol(f"missing_{linkage.links[i].name}", real=True)
+        symbol = sp.Symbol(f"law_missing_{linkage.links[i].name}", real=True)
         definitions[symbol] = (
             sum(matrix[i, j] * accelerations[j] for j in range(size))
             - applied[i]

@@ -80,17 +80,18 @@ class Push:
 
 @dataclass(frozen=True)
 class Build:
-    """What robots have in common that share their compiled equations; ``of`` is one of them."""
+    """What driven robots have in common that share their compiled equations, and one of them."""
 
     key: tuple[object, ...]
-    of: Robot = field(compare=False)
+    drive: Drive = field(compare=False)
 
     @classmethod
-    def like(cls, robot: Robot) -> Build:
-        """The build of a robot: its parts, and which of its numbers vanish."""
+    def like(cls, drive: Drive) -> Build:
+        """The build of a driven robot: its parts, and which of its numbers vanish."""
+        robot = drive.robot
         names = tuple(complete_motion(robot).values)
         parts = (robot.parents, robot.joints, robot.feet)
-        return cls((*(tuple(part.items()) for part in parts), names), robot)
+        return cls((*(tuple(part.items()) for part in parts), names, drive.key), drive)
 
 
 def complete_motion(robot: Robot) -> LinkageMotion:
@@ -127,31 +128,21 @@ def low_points(robot: Robot) -> list[tuple[str, str, float]]:
 
 
 class BoundRobot(BoundSystem):
-    """A robot's compiled system with its numbers.
+    """A driven robot's compiled system with its numbers.
 
     ``slides`` False: feet that touch at an impact stick or let go.
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        drive: Drive,
-        tolerance: float,
-        *,
-        push: Push | None = None,
-        slides: bool = True,
+        self, drive: Drive, tolerance: float, *, push: Push | None = None, slides: bool = True
     ) -> None:
-        system = articulated_system(Build.like(robot), drive)
-        own = complete_motion(robot).values | drive.values(robot)
+        system = articulated_system(Build.like(drive))
+        own = complete_motion(drive.robot).values | drive.values()
         own[PUSH_TIME] = -1.0 if push is None else push.time
         numbers = np.array([own[symbol] for symbol in system.parameters])
         super().__init__(compile_system(system, tolerance), numbers)
-        self.robot, self.drive, self.push, self.slides = robot, drive, push, slides
-
-    @property
-    def linkage(self) -> Linkage:
-        """The mechanism."""
-        return self.robot.linkage
+        self.drive, self.push, self.slides = drive, push, slides
+        self.robot, self.linkage = drive.robot, drive.robot.linkage
 
     def moment(self, point: HybridState) -> Moment:
         """What a drive needs to know of a point."""
@@ -167,7 +158,7 @@ class BoundRobot(BoundSystem):
         n, to = self.linkage.size, self.linkage.to_absolute
         held = np.array([moment.held[symbol] for symbol in self.system.held])
         new = np.concatenate([states[:n], to @ moment.rates, states[2 * n :]])
-        mode = moment.footing.name + self.drive.label(self.robot, moment)
+        mode = moment.footing.name + self.drive.label(moment)
         return HybridState(moment.time, mode, new, held)
 
     def start(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> HybridState:
@@ -208,23 +199,23 @@ class BoundRobot(BoundSystem):
 
 
 @lru_cache(maxsize=32)
-def articulated_system(build: Build, drive: Drive) -> HybridSystem:
-    """Assemble the hybrid system of all robots of one build with one kind of drive."""
-    robot = build.of
+def articulated_system(build: Build) -> HybridSystem:
+    """Assemble the hybrid system of all driven robots of one build."""
+    drive, robot = build.drive, build.drive.robot
     motion = complete_motion(robot)
     held = [symbol for foot in robot.feet for symbol in (*anchor(foot), *impulse(foot))]
     built: dict[str, Mode] = {}
 
     def mode(name: str) -> Mode:
         if name not in built:
-            built[name] = _Footed(robot, motion, drive, name).mode()
+            built[name] = _Footed(drive, motion, name).mode()
         return built[name]
 
     return HybridSystem(
-        name=f"{robot.name} {drive.name}",
+        name=robot.name,
         states=(*motion.coordinates, *motion.rates, CLOCK, WORK, DISSIPATED),
-        held=(*held, LOSS, *drive.held(robot)),
-        parameters=(*motion.values, *drive.values(robot), PUSH_TIME),
+        held=(*held, LOSS, *drive.held()),
+        parameters=(*motion.values, *drive.values(), PUSH_TIME),
         modes=(),
         mode=mode,
         section=Section((), {}, {}, {}, FELL),
@@ -236,10 +227,13 @@ def articulated_system(build: Build, drive: Drive) -> HybridSystem:
 class _Footed:
     """One mode in the making."""
 
-    robot: Robot
-    motion: LinkageMotion
     drive: Drive
+    motion: LinkageMotion
     name: str
+
+    @property
+    def robot(self) -> Robot:
+        return self.drive.robot
 
     @cached_property
     def footing(self) -> Footing:
@@ -247,7 +241,7 @@ class _Footed:
 
     @cached_property
     def turning(self) -> Turning:
-        return self.drive.turning(self.robot, self.motion, self.name)
+        return self.drive.turning(self.motion, self.name)
 
     def mode(self) -> Mode:
         motion, turning = self.motion, self.turning
@@ -273,7 +267,7 @@ class _Footed:
                 *(guard for foot in self.robot.feet for guard in self._contact(foot, forces)),
                 *self._falls(),
                 Guard("push", PUSH_TIME - CLOCK, decide=_pushed, timed=True),
-                *self.drive.guards(self.robot, self.name),
+                *self.drive.guards(self.motion, self.name),
             ),
             observables={
                 **{f"torque_{name}": torque for name, torque in turning.torques.items()},
@@ -389,7 +383,7 @@ def _hit(
         text = f"{found.solutions} at the impact of {', '.join(feet)} at t = {moment.time:.9g} s"
         return Outcome(kind, text)
     after = _after(robot, moment, feet, found, rates)
-    return robot.carry_on(robot.drive.after_impact(robot.robot, after, landed), states)
+    return robot.carry_on(robot.drive.after_impact(after, landed), states)
 
 
 def _after(

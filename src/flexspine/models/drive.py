@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -48,48 +48,39 @@ class Turning:
 
 @dataclass(frozen=True)
 class Drive:
-    """What turns the motors. This one leaves them alone.
+    """What turns the motors of a robot. This one leaves them alone."""
 
-    Drives that are equal share compiled equations, so what differs between them belongs to
-    ``values``.
-    """
+    robot: Robot
 
     @property
-    def name(self) -> str:
-        """What it is called."""
-        return "passive"
+    def key(self) -> tuple[Hashable, ...]:
+        """What it shares with all drives that have the same equations."""
+        return (type(self).__name__,)
 
-    def held(self, robot: Robot) -> tuple[sp.Symbol, ...]:
+    def held(self) -> tuple[sp.Symbol, ...]:
         """What it remembers."""
-        del robot
         return ()
 
-    def values(self, robot: Robot) -> dict[sp.Symbol, float]:
+    def values(self) -> dict[sp.Symbol, float]:
         """Its parameters."""
-        del robot
         return {}
 
-    def label(self, robot: Robot, moment: Moment) -> str:
+    def label(self, moment: Moment) -> str:
         """What else but the footing the mode depends on, `` by ...``."""
-        del robot, moment
         return ""
 
-    def turning(self, robot: Robot, motion: LinkageMotion, mode: str) -> Turning:
+    def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         """The torques in a mode."""
-        del robot, motion, mode
         return Turning()
 
     def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
-        """The torques at a point, shape (m,)."""
-        del point
+        """The torques at a point, in the order of the motors, shape (m,)."""
         return np.zeros(bound.linkage.actuation.shape[1])
 
-    def guards(self, robot: Robot, mode: str) -> tuple[Guard, ...]:
-        """When it changes its mind."""
-        del robot, mode
+    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
+        """When it changes its mind, or gives up."""
         return ()
 
-    def after_impact(self, robot: Robot, moment: Moment, landed: tuple[str, ...]) -> Moment:
+    def after_impact(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
         """What it makes of an impact at which feet landed."""
-        del robot, landed
         return moment

@@ -7,7 +7,7 @@ that come with flexspine. The first link is free, every other one has a parent.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -58,12 +58,25 @@ class GroundNumbers(ParameterSet):
 
 
 @dataclass(frozen=True)
+class LegParts:
+    """What makes a leg: its foot, its thigh and the part of the trunk that carries it.
+
+    The shank is the link of the foot. ``knee_back``: the knee is behind the line from hip to foot.
+    """
+
+    foot: str
+    thigh: str
+    trunk: str
+    knee_back: bool = True
+
+
+@dataclass(frozen=True)
 class Robot:
     """A planar robot: what hangs on what, and its numbers.
 
     ``parents`` by link, in the order of the coordinates; the first has none. ``joints`` by name:
     link and whether it has a motor. ``feet`` by name: link. ``numbers`` by dotted name, such as
-    ``spine.stiffness``, in SI units and radians.
+    ``spine.stiffness``, in SI units and radians. ``legs`` by name, for gaits.
     """
 
     name: str
@@ -72,6 +85,7 @@ class Robot:
     feet: Mapping[str, str]
     numbers: Mapping[str, float]
     source: Source
+    legs: Mapping[str, LegParts] = field(default_factory=dict)
 
     @cached_property
     def linkage(self) -> Linkage:
@@ -110,7 +124,7 @@ class Robot:
         return replace(self, numbers=numbers, source=replace(self.source, provenance=provenance))
 
     def _of(self, name: str, kind: type[ParameterSet]) -> dict[str, float]:
-        return {field: self.numbers[f"{name}.{field}"] for field in kind.model_fields}
+        return {each: self.numbers[f"{name}.{each}"] for each in kind.model_fields}
 
 
 def checked(

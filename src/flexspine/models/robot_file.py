@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from dataclasses import fields
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.model import Source
-from flexspine.models.robot import Robot, checked
+from flexspine.models.robot import LegParts, Robot, checked
 
 TABLES = ("links", "joints", "feet")
+LEGS = "legs"
 TEXTS = ("title", "citation", "source")
 LISTS = ("notes", "doubts")
 GROUND = ("gravity", "friction")
@@ -65,7 +67,7 @@ def _parsed(text: str) -> dict[str, Any]:
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as failure:
         raise InputError(f"not valid TOML: {failure}", "mend that line") from None
-    known = (*TABLES, *TEXTS, *LISTS, *GROUND)
+    known = (*TABLES, LEGS, *TEXTS, *LISTS, *GROUND)
     for entry in content:
         if entry not in known:
             raise InputError(f"unknown entry '{entry}'", f"known: {', '.join(known)}")
@@ -98,6 +100,9 @@ def _robot(name: str, content: Mapping[str, Any], origin: str) -> Robot:
         for part, entries in parts.items():
             _check_link(f"{table}.{part}", entries.get("link"), links)
     _check_joints(joints, parents)
+    legs = _table(content, LEGS)
+    for leg, entries in legs.items():
+        _check_leg(f"{LEGS}.{leg}", entries, links, feet)
     numbers = {entry: content[entry] for entry in GROUND if entry in content}
     for table, parts in zip(TABLES, (links, joints, feet), strict=True):
         for part, entries in parts.items():
@@ -123,6 +128,7 @@ def _robot(name: str, content: Mapping[str, Any], origin: str) -> Robot:
             notes=tuple(content.get("notes", ())),
             doubts=tuple(content.get("doubts", ())),
         ),
+        legs={leg: LegParts(**entries) for leg, entries in legs.items()},
     )
 
 
@@ -199,3 +205,35 @@ def _check_joints(joints: Mapping[str, Any], parents: Mapping[str, Any]) -> None
                 f"joints.{joint}: actuated = {entries['actuated']!r} is neither true nor false",
                 "write actuated = true",
             )
+
+
+def _check_leg(
+    where: str, entries: Mapping[str, Any], links: Mapping[str, Any], feet: Mapping[str, Any]
+) -> None:
+    known = tuple(each.name for each in fields(LegParts))
+    for entry in entries:
+        if entry not in known:
+            raise InputError(f"{where}: unknown entry '{entry}'", f"known: {', '.join(known)}")
+    for entry, places in (("foot", feet), ("thigh", links), ("trunk", links)):
+        name = entries.get(entry)
+        if not isinstance(name, str):
+            raise InputError(f"{where} names no {entry}", f'add {entry} = "NAME"')
+        if name not in places:
+            unknown = UnknownNameError("foot" if entry == "foot" else "link", name, places)
+            raise InputError(f"{where}: {unknown.message}", unknown.remedy)
+    if not isinstance(entries.get("knee_back", True), bool):
+        raise InputError(
+            f"{where}: knee_back = {entries['knee_back']!r} is neither true nor false",
+            "write knee_back = true",
+        )
+    shank, thigh, trunk = feet[entries["foot"]]["link"], entries["thigh"], entries["trunk"]
+    if len({shank, thigh, trunk}) < 3:
+        raise InputError(
+            f"{where}: shank '{shank}', thigh '{thigh}' and trunk '{trunk}' are not three links",
+            "name three links",
+        )
+    if links[thigh].get("parent") != shank and links[shank].get("parent") != thigh:
+        raise InputError(
+            f"{where}: thigh '{thigh}' does not meet the foot's link '{shank}'",
+            "name the link at the other side of the knee",
+        )

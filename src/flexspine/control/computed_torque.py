@@ -1,0 +1,131 @@
+"""Computed torque under constraints: joints follow their references exactly.
+
+``e'' + K_d e' + K_p e = 0`` for all motors, ``e`` being what an angle is off its reference. The
+law takes the feet for granted that are to stand and do; with two of them, of different hips, they
+and the joints fix the angle of the spine as well: inertias and the spine's spring then enter forces
+and torques, but not the motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from flexspine.control.references import References
+from flexspine.control.walking import Walker
+from flexspine.hybrid.compile import Array
+from flexspine.hybrid.outcome import OutcomeKind
+from flexspine.hybrid.system import Guard
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.mechanics.complementarity import Contact
+from flexspine.mechanics.linkage_motion import LinkageMotion, Standing
+from flexspine.mechanics.linkage_tracking import TrackedMotion, follow
+from flexspine.models.articulated import BoundRobot, anchor
+from flexspine.models.drive import Moment, Turning
+from flexspine.models.footing import Footing
+
+STIFFNESS, DAMPING = sp.symbols("K_p K_d", real=True)
+
+# m^2; the area between two feet and a joint without motor. Torques grow as it shrinks.
+CLOSEST = 1e-3
+
+SINGULAR = OutcomeKind(
+    "singular",
+    "two feet on the ground and a joint without motor are in line, where tracking needs torques "
+    "without bounds; take another posture or shorter steps",
+)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """``K_p`` in 1/s^2 and ``K_d`` in 1/s."""
+
+    stiffness: float = 400.0
+    damping: float = 40.0
+
+
+@dataclass(frozen=True)
+class ComputedTorque(Walker):
+    """Walk with joints that follow their references without delay."""
+
+    gains: Gains = Gains()
+
+    def values(self) -> dict[sp.Symbol, float]:
+        """The gains, and what the legs measure."""
+        own = {STIFFNESS: self.gains.stiffness, DAMPING: self.gains.damping}
+        return super().values() | own
+
+    def label(self, moment: Moment) -> str:
+        """The feet that the law counts on, where they are not those that stick."""
+        footing = moment.footing
+        counted = self._counted(moment)
+        return "" if counted == footing.feet else f" by {_named(counted)}"
+
+    def turning(self, motion: LinkageMotion, mode: str) -> Turning:
+        """The torques, and the motion where the law knows it."""
+        counted, footing = _feet_of(mode)
+        found = self._law(motion, counted)
+        known = counted == footing.feet
+        observables = {}
+        for joint, (angle, _, _) in self.references.joints.items():
+            observables[f"reference_{joint}"] = angle
+        return Turning(
+            torques=found.torques,
+            definitions={**self.references.definitions, **found.definitions},
+            observables=observables,
+            accelerations=found.accelerations if known else None,
+            forces=found.forces if known else {},
+        )
+
+    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
+        """Those of walking, and the law's own end."""
+        counted, _ = _feet_of(mode)
+        closeness = self._law(motion, counted).closeness
+        if closeness is None:
+            return super().guards(motion, mode)
+        return (
+            *super().guards(motion, mode),
+            Guard("feet and spine in line", closeness**2 - CLOSEST**2, ends=SINGULAR),
+        )
+
+    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+        """The torques, from where the law knows them."""
+        counted, _ = _feet_of(point.mode)
+        found = bound.observe(_named(counted), point.states[None], point.held)
+        motors = [joint for joint, (_, motor) in self.robot.joints.items() if motor]
+        return np.array([found[f"torque_{joint}"][0] for joint in motors])
+
+    def _counted(self, moment: Moment) -> tuple[str, ...]:
+        standing = {self.walk.legs[name].foot for name in self.walk.standing(moment.held)}
+        return tuple(foot for foot in moment.footing.sticking if foot in standing)
+
+    def _law(self, motion: LinkageMotion, feet: tuple[str, ...]) -> TrackedMotion:
+        wanted = wanted_accelerations(self.references, motion)
+        return follow(motion, [Standing(foot, anchor(foot)) for foot in feet], wanted)
+
+
+def wanted_accelerations(references: References, motion: LinkageMotion) -> dict[str, sp.Expr]:
+    """What joints are to do, and what brings them back to it."""
+    return {
+        joint: acceleration
+        + DAMPING * (rate - motion.bend_rate(joint))
+        + STIFFNESS * (angle - motion.bend(joint))
+        for joint, (angle, rate, acceleration) in references.joints.items()
+    }
+
+
+def _named(feet: tuple[str, ...]) -> str:
+    return Footing(tuple((foot, Contact.STICK) for foot in feet)).name
+
+
+def _feet_of(mode: str) -> tuple[tuple[str, ...], Footing]:
+    """The feet that the law counts on in a mode, and its footing."""
+    name, _, counted = mode.partition(" by ")
+    footing = Footing.named(name)
+    if not counted:
+        return footing.feet, footing
+    return Footing.named(counted).feet, footing
+
+

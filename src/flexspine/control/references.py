@@ -1,0 +1,201 @@
+"""From where feet and body are to be to what the joints are to do, in symbols.
+
+The trunk is to be straight and level and to move forward at a changing speed; each foot is to
+stand, or to swing along a cycloid and to come down at a small speed at its end. The angles of a
+leg follow from hip and foot by trigonometry, their rates and accelerations from
+``d' = l_1 a' n_a + l_2 b' n_b`` and its derivative, where ``d`` leads from hip to foot and ``n``
+are normal to thigh and shank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+
+import sympy as sp
+
+from flexspine.models.articulated import CLOCK
+from flexspine.models.leg_geometry import Leg
+from flexspine.models.robot import Robot
+
+
+# Angle, rate and acceleration.
+Motion = tuple[sp.Expr, sp.Expr, sp.Expr]
+
+Define = Callable[[str, sp.Expr], sp.Symbol]
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+@dataclass(frozen=True)
+class BodyCourse:
+    """How the middle of the trunk is to move: from ``x`` at ``start`` on with ``speed``.
+
+    SI units; the height of the hips, and what is gained in speed a second.
+    """
+
+    x: sp.Symbol = _symbol("body_x")
+    speed: sp.Symbol = _symbol("body_speed")
+    gain: sp.Symbol = _symbol("body_gain")
+    start: sp.Symbol = _symbol("body_start")
+    height: sp.Symbol = _symbol("body_height")
+
+    def motion(self) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+        """Place, speed and acceleration along x."""
+        since = CLOCK - self.start
+        return (
+            self.x + self.speed * since + self.gain * since**2 / 2,
+            self.speed + self.gain * since,
+            self.gain,
+        )
+
+
+@dataclass(frozen=True)
+class FootPath:
+    """How one foot is to move since ``start``, in SI units.
+
+    From ``x``, ``y`` it goes ``stride`` forward within ``span``, ``lift`` high on its way, so that
+    it comes down at ``landing`` a second; and all the while it sinks by ``sink`` a second.
+    """
+
+    x: sp.Symbol
+    y: sp.Symbol
+    stride: sp.Symbol
+    lift: sp.Symbol
+    landing: sp.Symbol
+    sink: sp.Symbol
+    start: sp.Symbol
+    span: sp.Symbol
+
+    @classmethod
+    def of(cls, leg: str) -> FootPath:
+        """The path of a leg's foot."""
+        return cls(*(_symbol(f"path_{each.name}_{leg}") for each in fields(cls)))
+
+    def motion(self) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+        """Place, velocity and acceleration."""
+        since = CLOCK - self.start
+        share, turn = since / self.span, 2 * sp.pi / self.span
+        x = self.x + self.stride * (share - sp.sin(turn * since) / (2 * sp.pi))
+        y = self.y + self.lift * (1 - sp.cos(turn * since)) / 2 - self.sink * since
+        y += self.landing * self.span * share**2 * (1 - share)
+        place = sp.Matrix([x, y])
+        return place, place.diff(CLOCK), place.diff(CLOCK, 2)
+
+
+BODY = BodyCourse()
+
+
+def leg_number(kind: str, leg: str) -> sp.Symbol:
+    """What a leg measures: its ``thigh``, its ``shank``, or where its ``hip`` is."""
+    return _symbol(f"{kind}_{leg}")
+
+
+def leg_numbers(legs: Mapping[str, Leg]) -> dict[sp.Symbol, float]:
+    """What all legs measure."""
+    return {
+        leg_number(kind, name): value
+        for name, leg in legs.items()
+        for kind, value in (
+            ("thigh", leg.thigh_length), ("shank", leg.shank_length), ("hip", leg.hip)
+        )
+    }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class References:
+    """What joints are to do: angle, rate and acceleration by joint, in terms of definitions.
+
+    ``links`` are the same of the legs' links, from +x; those of the trunk are level. ``stretch``
+    is how far each leg is stretched, in m.
+    """
+
+    definitions: Mapping[sp.Symbol, sp.Expr]
+    joints: Mapping[str, Motion]
+    links: Mapping[str, Motion]
+    stretch: Mapping[str, sp.Expr]
+
+
+def references(robot: Robot, legs: Mapping[str, Leg]) -> References:
+    """What the motors' joints are to do, from the body's course and the feet's paths."""
+    definitions: dict[sp.Symbol, sp.Expr] = {}
+
+    def define(name: str, expression: sp.Expr) -> sp.Symbol:
+        symbol = _symbol(name)
+        definitions[symbol] = expression
+        return symbol
+
+    links: dict[str, Motion] = {}
+    stretch = {}
+    body = BODY.motion()
+    for name, leg in legs.items():
+        foot = FootPath.of(name).motion()
+        hips = [sp.Matrix([body[0] + leg_number("hip", name), BODY.height])]
+        hips += [sp.Matrix([each, 0]) for each in body[1:]]
+        reach = [
+            sp.Matrix([define(f"reach_{axis}{order}_{name}", part[i]) for i, axis in enumerate("xy")])
+            for order, part in enumerate(f - h for f, h in zip(foot, hips, strict=True))
+        ]
+        lengths = leg_number("thigh", name), leg_number("shank", name)
+        stretch[name] = define(f"stretch_{name}", sp.sqrt(reach[0].dot(reach[0])))
+        angles = _angles(name, reach[0], stretch[name], lengths, leg.knee_back, define)
+        motion = _turns(name, angles, reach, lengths, define)
+        turned = sp.pi if leg.upwards else 0
+        for link, (angle, rate, acceleration) in zip((leg.thigh, leg.shank), motion, strict=True):
+            links[link] = (angle + turned, rate, acceleration)
+    still = (sp.S.Zero, sp.S.Zero, sp.S.Zero)
+    joints = {}
+    for joint, (link, motor) in robot.joints.items():
+        if motor:
+            child, parent = links.get(link, still), links.get(robot.parents[link] or "", still)
+            here = [c - p for c, p in zip(child, parent, strict=True)]
+            joints[joint] = (here[0], here[1], here[2])
+    return References(definitions, joints, links, stretch)
+
+
+def _angles(
+    name: str,
+    reach: sp.Matrix,
+    length: sp.Expr,
+    lengths: tuple[sp.Symbol, sp.Symbol],
+    back: bool,
+    define: Define,
+) -> tuple[sp.Symbol, sp.Symbol]:
+    """Angles of thigh and shank, from hip to knee and from knee to foot, from +x."""
+    thigh, shank = lengths
+    way = sp.atan2(reach[1], reach[0])
+    at_hip = sp.acos((thigh**2 + length**2 - shank**2) / (2 * thigh * length))
+    at_foot = sp.acos((shank**2 + length**2 - thigh**2) / (2 * shank * length))
+    side = -1 if back else 1
+    return (
+        define(f"thigh_to_be_{name}", way + side * at_hip),
+        define(f"shank_to_be_{name}", way - side * at_foot),
+    )
+
+
+def _turns(
+    name: str,
+    angles: tuple[sp.Symbol, sp.Symbol],
+    reach: list[sp.Matrix],
+    lengths: tuple[sp.Symbol, sp.Symbol],
+    define: Define,
+) -> tuple[Motion, Motion]:
+    """Angle, rate and acceleration of thigh and shank."""
+    thigh, shank = (
+        sp.Matrix([define(f"{f.__name__}_{angle.name}", f(angle)) for f in (sp.cos, sp.sin)])
+        for angle in angles
+    )
+    bend = define(f"sin_knee_to_be_{name}", thigh[0] * shank[1] - thigh[1] * shank[0])
+    arms = lengths[0] * bend, -lengths[1] * bend
+    rates = [
+        define(f"thigh_to_be_{name}_rate", reach[1].dot(shank) / arms[0]),
+        define(f"shank_to_be_{name}_rate", reach[1].dot(thigh) / arms[1]),
+    ]
+    pull = reach[2] + lengths[0] * rates[0] ** 2 * thigh + lengths[1] * rates[1] ** 2 * shank
+    gains = [
+        define(f"thigh_to_be_{name}_gain", pull.dot(shank) / arms[0]),
+        define(f"shank_to_be_{name}_gain", pull.dot(thigh) / arms[1]),
+    ]
+    return (angles[0], rates[0], gains[0]), (angles[1], rates[1], gains[1])

@@ -1,0 +1,248 @@
+"""Walking on pairs of legs: which feet stand and which swing, and where they are to land.
+
+While one pair of legs stands, the other swings and comes down; when both its feet are on the
+ground the pairs change. Feet that have landed stay where they did, which keeps errors of the
+distance between them from adding up. Speed is changed evenly over the first steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+
+import numpy as np
+import sympy as sp
+
+from flexspine.control.references import (
+    BODY,
+    FootPath,
+    References,
+    leg_number,
+    leg_numbers,
+    references,
+)
+from flexspine.errors import ParameterError
+from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.outcome import Outcome, OutcomeKind
+from flexspine.hybrid.system import Guard
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.mechanics.linkage_motion import LinkageMotion
+from flexspine.models.articulated import CLOCK, BoundRobot, anchor
+from flexspine.models.drive import Drive, Moment
+from flexspine.models.leg_geometry import Leg, legs_of
+from flexspine.models.robot import Robot
+
+STEP, SWING_END = sp.symbols("step swing_end", real=True)
+
+# Of the swing; feet that touch the ground before have not been put down but stumbled.
+EARLIEST_LANDING = 0.5
+
+# Of the stretched leg; beyond this angles change without bounds.
+LONGEST = 0.999
+
+OUT_OF_REACH = OutcomeKind(
+    "out_of_reach",
+    "a foot is to be where its leg cannot reach; lower the hips, or walk with shorter steps",
+)
+
+
+@dataclass(frozen=True)
+class Gait:
+    """How to walk, in SI units.
+
+    ``height`` is that of the hips, ``stance`` how long a pair of legs stands, ``clearance`` how
+    high feet are lifted, ``landing`` how fast they come down, ``ramp`` the number of steps until
+    the ``speed`` is reached.
+    """
+
+    speed: float = 0.3
+    height: float = 0.33
+    stance: float = 0.4
+    clearance: float = 0.04
+    landing: float = 0.05
+    ramp: int = 4
+
+    def speed_after(self, steps: float) -> float:
+        """The speed that is wanted after so many steps."""
+        return self.speed * min(1.0, steps / self.ramp)
+
+
+def diagonal_pairs(legs: Mapping[str, Leg]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The pairs of a trot: a hind leg and the fore leg of the other side.
+
+    Raises `ParameterError` unless two legs are at either hip.
+    """
+    hips = sorted({leg.hip for leg in legs.values()})
+    at = [[name for name, leg in legs.items() if leg.hip == hip] for hip in hips]
+    if [len(names) for names in at] != [2, 2]:
+        raise ParameterError(
+            f"legs per hip: {', '.join(str(len(names)) for names in at)}",
+            "a trot needs two legs at each of two hips",
+        )
+    hind, fore = at
+    return (hind[0], fore[1]), (hind[1], fore[0])
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The plan of a walk for one robot."""
+
+    robot: Robot
+    gait: Gait
+
+    @cached_property
+    def legs(self) -> dict[str, Leg]:
+        """Its legs."""
+        return legs_of(self.robot)
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The legs that stand together, those of the first step first."""
+        return diagonal_pairs(self.legs)
+
+    def standing(self, held: Mapping[sp.Symbol, float]) -> tuple[str, ...]:
+        """The legs that are to stand."""
+        return self.pairs[int(held[STEP]) % 2]
+
+    def swinging(self, held: Mapping[sp.Symbol, float]) -> tuple[str, ...]:
+        """The legs that are to swing."""
+        return self.pairs[1 - int(held[STEP]) % 2]
+
+    def begin(self) -> dict[sp.Symbol, float]:
+        """Stand with all feet below the hips, about to lift the first pair."""
+        held = {BODY.x: 0.0, BODY.speed: 0.0, BODY.gain: 0.0, BODY.start: 0.0}
+        held |= {BODY.height: self.gait.height, STEP: -1.0, SWING_END: inf}
+        for name, leg in self.legs.items():
+            held |= _stand(name, leg.hip, 0.0)
+        return self._next_step(held, 0.0)
+
+    def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> dict[sp.Symbol, float]:
+        """Keep feet where they landed; if all that swung have, let the others swing."""
+        held = dict(moment.held)
+        swings = self.swinging(held)
+        for name, leg in self.legs.items():
+            if leg.foot not in landed or leg.foot not in moment.footing.feet:
+                continue
+            path = FootPath.of(name)
+            begun = moment.time - held[path.start]
+            if name in swings and held[path.stride] and begun < EARLIEST_LANDING * held[path.span]:
+                continue
+            x, y = (held[symbol] for symbol in anchor(leg.foot))
+            held |= _stand(name, x, y)
+        down = [_stands(name, held) for name in swings]
+        return self._next_step(held, moment.time) if all(down) else held
+
+    def swing_over(self, held: Mapping[sp.Symbol, float], time: float) -> dict[sp.Symbol, float]:
+        """Let feet that ought to have landed sink until they do."""
+        new = dict(held)
+        for name in self.swinging(held):
+            if not _stands(name, held):
+                path = FootPath.of(name)
+                new |= _stand(name, held[path.x] + held[path.stride], 0.0)
+                new |= {path.sink: self.gait.landing, path.start: time}
+        return new | {SWING_END: inf}
+
+    def _next_step(self, held: dict[sp.Symbol, float], time: float) -> dict[sp.Symbol, float]:
+        """Change pairs."""
+        gait, since = self.gait, time - held[BODY.start]
+        x = held[BODY.x] + held[BODY.speed] * since + held[BODY.gain] * since**2 / 2
+        speed = held[BODY.speed] + held[BODY.gain] * since
+        step = held[STEP] + 1
+        aims = gait.speed_after(step + 1), gait.speed_after(step + 2)
+        gain = (aims[0] - speed) / gait.stance
+        new = {**held, STEP: step, SWING_END: time + gait.stance, BODY.start: time}
+        new |= {BODY.x: x, BODY.speed: speed, BODY.gain: gain}
+        ahead = (speed + aims[0]) / 2 * gait.stance  # until it lands
+        ahead += sum(aims) / 4 * gait.stance  # and half of what comes then
+        for name in self.swinging(new):
+            path = FootPath.of(name)
+            new |= {
+                path.stride: x + self.legs[name].hip + ahead - held[path.x],
+                path.lift: gait.clearance,
+                path.landing: gait.landing,
+                path.sink: 0.0,
+                path.start: time,
+                path.span: gait.stance,
+            }
+        return new
+
+
+def _stand(leg: str, x: float, y: float) -> dict[sp.Symbol, float]:
+    """The path of a foot that stays where it is."""
+    path = FootPath.of(leg)
+    still = dict.fromkeys((path.stride, path.lift, path.landing, path.sink, path.start), 0.0)
+    return {path.x: x, path.y: y, **still, path.span: 1.0}
+
+
+def _stands(leg: str, held: Mapping[sp.Symbol, float]) -> bool:
+    """Whether a foot is to stay where it is."""
+    path = FootPath.of(leg)
+    return held[path.lift] == 0 and held[path.sink] == 0
+
+
+@dataclass(frozen=True)
+class Walker(Drive):
+    """A drive that walks; how torques follow from what joints are to do is left to its kinds."""
+
+    gait: Gait = Gait()
+
+    @cached_property
+    def walk(self) -> Walk:
+        """The plan."""
+        return Walk(self.robot, self.gait)
+
+    @cached_property
+    def references(self) -> References:
+        """What joints are to do."""
+        return references(self.robot, self.walk.legs)
+
+    def held(self) -> tuple[sp.Symbol, ...]:
+        """The plan's numbers."""
+        return tuple(self.walk.begin())
+
+    def values(self) -> dict[sp.Symbol, float]:
+        """What the legs measure."""
+        return leg_numbers(self.walk.legs)
+
+    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
+        """The end of a swing; and no leg is longer than it is."""
+        found = [Guard("swing over", SWING_END - CLOCK, decide=_swing_over, timed=True)]
+        for name in self.walk.legs:
+            whole = leg_number("thigh", name) + leg_number("shank", name)
+            slack = LONGEST * whole - self.references.stretch[name]
+            found.append(Guard(f"{name} out of reach", slack, ends=OUT_OF_REACH))
+        return tuple(found)
+
+    def after_impact(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
+        """Change pairs if it is time to."""
+        return replace(moment, held=self.walk.after_landing(moment, landed))
+
+    def posture(self, held: Mapping[sp.Symbol, float]) -> Array:
+        """``q`` as it is to be at the beginning."""
+        linkage, known = self.robot.linkage, {**held, **self.values(), CLOCK: 0.0}
+        for symbol, expression in self.references.definitions.items():
+            known[symbol] = float(expression.xreplace(known))
+        q = np.zeros(linkage.size)
+        for link, (angle, _, _) in self.references.links.items():
+            q[linkage.place[link]] = float(angle.xreplace(known))
+        q = linkage.to_relative @ q
+        leg, parts = next(iter(self.walk.legs.items()))
+        path = FootPath.of(leg)
+        q[-2:] = np.array([held[path.x], held[path.y]]) - linkage.foot(q, parts.foot)
+        return q
+
+    def begin(self, bound: BoundRobot) -> HybridState:
+        """The robot at rest on all its feet, about to take the first step."""
+        held = self.walk.begin()
+        return bound.start(self.posture(held), np.zeros(self.robot.linkage.size), held)
+
+
+def _swing_over(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:
+    """Feet that ought to have landed sink until they do."""
+    assert isinstance(bound, BoundRobot)
+    assert isinstance(bound.drive, Walker)
+    moment = bound.moment(point)
+    held = bound.drive.walk.swing_over(moment.held, moment.time)
+    return bound.carry_on(replace(moment, held=held), point.states)
