@@ -60,14 +60,14 @@ class ComputedTorque(Walker):
     def label(self, moment: Moment) -> str:
         """The feet that the law counts on, where they are not those that stick."""
         footing = moment.footing
-        counted = self._counted(moment)
-        return "" if counted == footing.feet else f" by {_named(counted)}"
+        counted = self.counted(moment)
+        return "" if _known(counted, footing) else f" by {_named(counted)}"
 
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         """The torques, and the motion where the law knows it."""
         counted, footing = _feet_of(mode)
         found = self._law(motion, counted)
-        known = counted == footing.feet
+        known = _known(counted, footing)
         observables = {}
         for joint, (angle, _, _) in self.references.joints.items():
             observables[f"reference_{joint}"] = angle
@@ -94,12 +94,7 @@ class ComputedTorque(Walker):
         """The torques, from where the law knows them."""
         counted, _ = _feet_of(point.mode)
         found = bound.observe(_named(counted), point.states[None], point.held)
-        motors = [joint for joint, (_, motor) in self.robot.joints.items() if motor]
-        return np.array([found[f"torque_{joint}"][0] for joint in motors])
-
-    def _counted(self, moment: Moment) -> tuple[str, ...]:
-        standing = {self.walk.legs[name].foot for name in self.walk.standing(moment.held)}
-        return tuple(foot for foot in moment.footing.sticking if foot in standing)
+        return np.array([found[f"torque_{joint}"][0] for joint in self.motors])
 
     def _law(self, motion: LinkageMotion, feet: tuple[str, ...]) -> TrackedMotion:
         wanted = wanted_accelerations(self.references, motion)
@@ -114,6 +109,11 @@ def wanted_accelerations(references: References, motion: LinkageMotion) -> dict[
         + STIFFNESS * (angle - motion.bend(joint))
         for joint, (angle, rate, acceleration) in references.joints.items()
     }
+
+
+def _known(counted: tuple[str, ...], footing: Footing) -> bool:
+    """Whether the feet that the law counts on are those on the ground, and none slides."""
+    return counted == footing.feet == footing.sticking
 
 
 def _named(feet: tuple[str, ...]) -> str:

@@ -9,11 +9,15 @@ are normal to thigh and shank.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
+import heyoka as hy
+import numpy as np
 import sympy as sp
 
+from flexspine.hybrid.compile import Array, compile_expressions
+from flexspine.hybrid.lowering import Lowering
 from flexspine.models.articulated import CLOCK
 from flexspine.models.leg_geometry import Leg
 from flexspine.models.robot import Robot
@@ -199,3 +203,24 @@ def _turns(
         define(f"shank_to_be_{name}_gain", pull.dot(thigh) / arms[1]),
     ]
     return (angles[0], rates[0], gains[0]), (angles[1], rates[1], gains[1])
+
+
+class ReferenceFunction:
+    """References in numbers, compiled."""
+
+    def __init__(self, of: References, motors: Sequence[str], inputs: Sequence[sp.Symbol]) -> None:
+        self._inputs = tuple(inputs)
+        variables = [hy.expression(f"z{i}") for i in range(len(self._inputs))]
+        lower = Lowering(dict(zip(self._inputs, variables, strict=True)), (), of.definitions, 0)
+        wanted = [of.joints[joint] for joint in motors] + list(of.links.values())
+        self._function = compile_expressions(
+            [lower(part) for motion in wanted for part in motion], variables
+        )
+        self._motors, self._links = len(motors), tuple(of.links)
+
+    def __call__(self, known: Mapping[sp.Symbol, float]) -> tuple[Array, dict[str, Array]]:
+        """Angle, rate and acceleration of the motors' joints, shape (3, m), and of links (3,)."""
+        found = self._function(np.array([known[symbol] for symbol in self._inputs]))
+        table = found.reshape(-1, 3)
+        links = dict(zip(self._links, table[self._motors :], strict=True))
+        return table[: self._motors].T, links

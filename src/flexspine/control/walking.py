@@ -18,6 +18,7 @@ import sympy as sp
 from flexspine.control.references import (
     BODY,
     FootPath,
+    ReferenceFunction,
     References,
     leg_number,
     leg_numbers,
@@ -198,6 +199,21 @@ class Walker(Drive):
         """What joints are to do."""
         return references(self.robot, self.walk.legs)
 
+    @cached_property
+    def motors(self) -> list[str]:
+        """The joints with a motor, in order."""
+        return [joint for joint, (_, motor) in self.robot.joints.items() if motor]
+
+    @cached_property
+    def _reference_function(self) -> ReferenceFunction:
+        inputs = [CLOCK, *self.walk.begin(), *leg_numbers(self.walk.legs)]
+        return ReferenceFunction(self.references, self.motors, inputs)
+
+    def references_at(self, moment: Moment) -> tuple[Array, dict[str, Array]]:
+        """Angle, rate and acceleration of the motors' joints, shape (3, m), and of links (3,)."""
+        known = {**moment.held, **leg_numbers(self.walk.legs), CLOCK: moment.time}
+        return self._reference_function(known)
+
     def held(self) -> tuple[sp.Symbol, ...]:
         """The plan's numbers."""
         return tuple(self.walk.begin())
@@ -219,24 +235,33 @@ class Walker(Drive):
         """Change pairs if it is time to."""
         return replace(moment, held=self.walk.after_landing(moment, landed))
 
+    def counted(self, moment: Moment) -> tuple[str, ...]:
+        """The feet that are to stand. A foot that bounces or slides for a moment still counts."""
+        standing = {self.walk.legs[name].foot for name in self.walk.standing(moment.held)}
+        return tuple(foot for foot in self.robot.feet if foot in standing)
+
     def posture(self, held: Mapping[sp.Symbol, float]) -> Array:
         """``q`` as it is to be at the beginning."""
-        linkage, known = self.robot.linkage, {**held, **self.values(), CLOCK: 0.0}
-        for symbol, expression in self.references.definitions.items():
-            known[symbol] = float(expression.xreplace(known))
-        q = np.zeros(linkage.size)
-        for link, (angle, _, _) in self.references.links.items():
-            q[linkage.place[link]] = float(angle.xreplace(known))
+        linkage, q = self.robot.linkage, np.zeros(self.robot.linkage.size)
+        known = {**held, **leg_numbers(self.walk.legs), CLOCK: 0.0}
+        for link, (angle, _, _) in self._reference_function(known)[1].items():
+            q[linkage.place[link]] = angle
         q = linkage.to_relative @ q
         leg, parts = next(iter(self.walk.legs.items()))
         path = FootPath.of(leg)
         q[-2:] = np.array([held[path.x], held[path.y]]) - linkage.foot(q, parts.foot)
         return q
 
-    def begin(self, bound: BoundRobot) -> HybridState:
+    def begin(self, bound: BoundRobot) -> HybridState | Outcome:
         """The robot at rest on all its feet, about to take the first step."""
-        held = self.walk.begin()
-        return bound.start(self.posture(held), np.zeros(self.robot.linkage.size), held)
+        held = dict.fromkeys(self.held(), 0.0) | self.walk.begin()
+        q = self.posture(held)
+        start = self.ready(bound.stand(q, np.zeros_like(q), held))
+        return bound.carry_on(start, bound.at_rest(q))
+
+    def ready(self, start: Moment) -> Moment:
+        """What there is to do before the first step."""
+        return start
 
 
 def _swing_over(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:

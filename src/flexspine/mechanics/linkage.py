@@ -162,6 +162,14 @@ class Linkage:
         arms, angles = self.moments / self.mass, self.angles(q)
         return q[..., -2:] + np.stack([np.cos(angles) @ arms, np.sin(angles) @ arms], axis=-1)
 
+    def com_jacobian(self, q: Array) -> Array:
+        """The velocity of the centre of mass by ``q'``, shape (..., 2, N)."""
+        return self._jacobian(q, [self.moments / self.mass])
+
+    def com_bias(self, q: Array, rates: Array) -> Array:
+        """The acceleration of the centre of mass without ``q''``, shape (..., 2)."""
+        return self._bias(q, rates, [self.moments / self.mass])
+
     def mass_matrix(self, q: Array) -> Array:
         """``D`` of ``D q'' + C q' + G = Q``, shape (..., N, N)."""
         angles, n = self.angles(q), len(self.links)
@@ -231,12 +239,15 @@ class Linkage:
 
     def foot_bias(self, q: Array, rates: Array, feet: Iterable[str]) -> Array:
         """``J' q'``, the accelerations of feet without ``q''``, shape (..., 2 feet)."""
+        return self._bias(q, rates, [self.foot_arms(name) for name in feet])
+
+    def _bias(self, q: Array, rates: Array, points: list[Array]) -> Array:
+        """The accelerations of points with these lever arms, without ``q''``."""
         angles, squares = self.angles(q), self.angles(rates) ** 2
         parts = []
-        for name in (feet := list(feet)):
-            arms = self.foot_arms(name)
+        for arms in points:
             parts += [-(squares * np.cos(angles)) @ arms, -(squares * np.sin(angles)) @ arms]
-        return np.moveaxis(np.array(parts).reshape(2 * len(feet), *q.shape[:-1]), 0, -1)
+        return np.moveaxis(np.array(parts).reshape(2 * len(points), *q.shape[:-1]), 0, -1)
 
     def kinetic_energy(self, q: Array, rates: Array) -> Array:
         """In J, shape (...)."""

@@ -75,17 +75,27 @@ def supported(
     torques: Array,
     friction: float,
     moving: Sequence[Contact | None],
-) -> Resolution:
+) -> tuple[Resolution, Array]:
     """Find what feet on the ground do next: which of them lift off, stick or begin to slide.
 
-    ``moving`` names those that slide already. The pushes are forces in N.
+    ``moving`` names those that slide already. The pushes are forces in N; with them come the
+    accelerations that they lead to, shape (N,).
     """
     jacobian = linkage.foot_jacobian(q, feet)
     applied = linkage.actuation @ torques - passive_forces(linkage, q, rates)
     columns = np.concatenate([jacobian.T, applied[:, None]], axis=1)
     solved = np.linalg.solve(linkage.mass_matrix(q), columns)
-    free = jacobian @ solved[:, -1] + linkage.foot_bias(q, rates, feet)
-    return resolve(jacobian @ solved[:, :-1], free, friction, moving)
+    spread, free = solved[:, :-1], solved[:, -1]
+    before = jacobian @ free + linkage.foot_bias(q, rates, feet)
+    found = resolve(jacobian @ spread, before, friction, moving)
+    return found, free + spread @ found.pushes.ravel()
+
+
+def stopped(linkage: Linkage, q: Array, rates: Array, rows: Array) -> Array:
+    """The rates (N,) after what ``rows`` move, shape (k, N), has been stopped at once."""
+    spread = np.linalg.solve(linkage.mass_matrix(q), rows.T)
+    pushes = np.linalg.lstsq(rows @ spread, rows @ rates, rcond=None)[0]
+    return np.asarray(rates - spread @ pushes, dtype=float)
 
 
 def _solve(linkage: Linkage, q: Array, held: Array, applied: Array, needed: Array) -> Array:

@@ -25,7 +25,7 @@ from flexspine.mechanics.complementarity import Contact, Verdict
 from flexspine.mechanics.impact import Impact, impact
 from flexspine.mechanics.linkage import Linkage
 from flexspine.mechanics.linkage_motion import LinkageMotion, Point, Standing
-from flexspine.mechanics.stance import supported
+from flexspine.mechanics.stance import stopped, supported
 from flexspine.models.bounder import FELL
 from flexspine.models.drive import Drive, Moment, Turning
 from flexspine.models.footing import Footing
@@ -36,13 +36,21 @@ LOSS, PUSH_TIME = sp.symbols("impact_loss push_time", real=True)
 
 # N; contact forces may be out of their cones by this much, which is more than rounding errors, so
 # that a foot at the edge is found to leave it.
-SLACK = 1e-9
+SLACK = 1e-7
 
-# m/s; a foot that comes down more slowly has only just left.
-SLOWEST_LANDING = 1e-9
+# m; how deep a foot is in the ground when it lands. More than rounding errors, so that a foot that
+# has just left the ground is above this.
+DEPTH = 1e-15
+
+# m; feet that would bounce less high stay on the ground. Bounces of several feet in turn grow
+# smaller by the thousand and would never end.
+LEAST_BOUNCE = 1e-14
 
 # m/s; above the rounding errors of a foot that has just begun to slide.
 CREEP = 1e-12
+
+# m; feet at this height are on the ground when a run begins.
+GROUND = 1e-9
 
 # s; feet that land closer together than this land at once.
 TOGETHER = 1e-12
@@ -161,41 +169,74 @@ class BoundRobot(BoundSystem):
         mode = moment.footing.name + self.drive.label(moment)
         return HybridState(moment.time, mode, new, held)
 
-    def start(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> HybridState:
-        """Begin at rest in time; feet within rounding error of the ground stand on it.
-
-        Raises `ValueError` if they cannot.
-        """
+    def stand(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> Moment:
+        """The beginning of time; feet within rounding error of the ground are on it."""
         linkage = self.linkage
         places = {foot: linkage.foot(q, foot) for foot in self.robot.feet}
-        low = [foot for foot, (_, y) in places.items() if abs(y) <= SLOWEST_LANDING]
+        low = [foot for foot, (_, y) in places.items() if abs(y) <= GROUND]
         values = dict.fromkeys(self.system.held, 0.0)
         for foot, place in places.items():
             values |= dict(zip(anchor(foot), place.tolist(), strict=True))
         footing = Footing.of(dict.fromkeys(low, Contact.STICK), self.robot.feet)
-        moment = Moment(0.0, q, rates, footing, {**values, **held})
-        states = np.concatenate([linkage.to_absolute @ q, linkage.to_absolute @ rates, np.zeros(3)])
-        found = self.carry_on(moment, states)
-        if isinstance(found, Outcome):
-            raise ValueError(found.message)
-        return found
+        return Moment(0.0, q, rates, footing, {**values, **held})
+
+    def at_rest(self, q: Array) -> Array:
+        """All that flows, at rest with these coordinates."""
+        n = self.linkage.size
+        return np.concatenate([self.linkage.to_absolute @ q, np.zeros(n + 3)])
 
     def carry_on(self, moment: Moment, states: Array) -> HybridState | Outcome:
         """Go on after something jumped: find out what each touching foot does next."""
-        feet = moment.footing.feet
-        if feet:
+        while moment.footing.feet:
+            feet = moment.footing.feet
             torques = self.drive.torques_at(self, self.point(moment, states))
             moving = [
                 None if does is Contact.STICK else does for _, does in moment.footing.contacts
             ]
-            found = supported(
+            found, accelerations = supported(
                 self.linkage, moment.q, moment.rates, feet, torques, self.robot.friction, moving
             )
             if found.verdict is Verdict.NONE:
                 return Outcome(NO_SOLUTION, f"{moment.footing.name} at t = {moment.time:.9g} s")
             contacts = dict(zip(feet, found.contacts, strict=True))
-            moment = replace(moment, footing=Footing.of(contacts, self.robot.feet))
+            after = replace(moment, footing=Footing.of(contacts, self.robot.feet))
+            lingering = self._lingering(after, accelerations)
+            if not lingering:
+                moment = after
+                break
+            moment = self._settled(after, lingering)
         return self.point(moment, states)
+
+    def _lingering(self, moment: Moment, accelerations: Array) -> list[str]:
+        """Feet in the air that would come back without having left."""
+        linkage, found = self.linkage, []
+        for foot in self.robot.feet:
+            if moment.footing.does(foot) is Contact.OPEN:
+                height = linkage.foot(moment.q, foot)[1]
+                rise = self.rise(moment, foot)
+                bias = linkage.foot_bias(moment.q, moment.rates, [foot])[1]
+                gain = linkage.foot_jacobian(moment.q, [foot])[1] @ accelerations + bias
+                low = height <= LEAST_BOUNCE and rise >= 0
+                if low and gain < 0 and rise**2 <= 2 * -gain * LEAST_BOUNCE:
+                    found.append(foot)
+        return found
+
+    def _settled(self, moment: Moment, lingering: list[str]) -> Moment:
+        """The moment with more feet on the ground, what is left of their motion taken away."""
+        after = touching(self, moment, dict.fromkeys(lingering, Contact.STICK))
+        rows = [
+            row
+            for foot, does in after.footing.contacts
+            for row in self.linkage.foot_jacobian(moment.q, [foot])[
+                (0 if does is Contact.STICK else 1) :
+            ]
+        ]
+        rates = stopped(self.linkage, moment.q, moment.rates, np.array(rows))
+        return replace(after, rates=rates)
+
+    def rise(self, moment: Moment, foot: str) -> float:
+        """How fast a foot rises, in m/s."""
+        return float(self.linkage.foot_jacobian(moment.q, [foot])[1] @ moment.rates)
 
 
 @lru_cache(maxsize=32)
@@ -305,7 +346,7 @@ class _Footed:
         does = self.footing.does(foot)
         if does is Contact.OPEN:
             height = self.motion.foot(foot)[1]
-            return [Guard(f"{foot} touchdown", height, decide=partial(_landed, foot))]
+            return [Guard(f"{foot} touchdown", height + DEPTH, decide=partial(_landed, foot))]
         tangent, normal = forces[foot]
         opens = partial(_changed, foot, Contact.OPEN)
         found = [Guard(f"{foot} lift-off", normal + SLACK, decide=opens)]
@@ -342,13 +383,11 @@ def _landed(foot: str, bound: BoundSystem, point: HybridState) -> Decided:
     """A foot comes down: a plastic impact of all feet that touch."""
     robot = _robot(bound)
     moment, linkage = robot.moment(point), robot.linkage
-    down = {foot: _rise(linkage, moment, foot)}
-    if down[foot] > -SLOWEST_LANDING:
-        return None
+    down = {foot: robot.rise(moment, foot)}
     for other in robot.robot.feet:
         if moment.footing.does(other) is Contact.OPEN and other != foot:
-            rise = _rise(linkage, moment, other)
-            if rise < 0 and linkage.foot(moment.q, other)[1] <= -rise * TOGETHER:
+            rise = robot.rise(moment, other)
+            if rise < 0 and linkage.foot(moment.q, other)[1] <= DEPTH - rise * TOGETHER:
                 down[other] = rise
     touching = [each for each in robot.robot.feet if each in {*down, *moment.footing.feet}]
     return _hit(robot, moment, point.states, touching, moment.rates, tuple(down))
@@ -397,12 +436,25 @@ def _after(
         held |= dict(zip(impulse(name), push.tolist(), strict=True))
     energies = [linkage.kinetic_energy(moment.q, each) for each in (rates, found.rates)]
     held[LOSS] += float(energies[0] - energies[1])
-    footing = Footing.of(dict(zip(feet, found.contacts, strict=True)), robot.robot.feet)
-    for name in footing.feet:
-        if moment.footing.does(name) is not Contact.STICK:
-            place = linkage.foot(moment.q, name).tolist()
+    hit = replace(moment, rates=found.rates, footing=Footing(), held=held)
+    stood = moment.footing.sticking
+    return touching(robot, hit, dict(zip(feet, found.contacts, strict=True)), stood)
+
+
+def touching(
+    robot: BoundRobot,
+    moment: Moment,
+    contacts: Mapping[str, Contact],
+    stood: tuple[str, ...] = (),
+) -> Moment:
+    """The moment with some feet on the ground, where they are now unless they have stood there."""
+    held = dict(moment.held)
+    for name in contacts:
+        if name not in stood:
+            place = robot.linkage.foot(moment.q, name).tolist()
             held |= dict(zip(anchor(name), place, strict=True))
-    return replace(moment, rates=found.rates, footing=footing, held=held)
+    footing = Footing.of({**dict(moment.footing.contacts), **contacts}, robot.robot.feet)
+    return replace(moment, footing=footing, held=held)
 
 
 def _changed(foot: str, does: Contact, bound: BoundSystem, point: HybridState) -> Decided:
@@ -416,13 +468,5 @@ def _changed(foot: str, does: Contact, bound: BoundSystem, point: HybridState) -
 def _stopped(foot: str, bound: BoundSystem, point: HybridState) -> Decided:
     """A foot comes to rest, or turns round."""
     robot = _robot(bound)
-    moment = robot.moment(point)
-    place = robot.linkage.foot(moment.q, foot).tolist()
-    held = moment.held | dict(zip(anchor(foot), place, strict=True))
-    footing = moment.footing.but(foot, Contact.STICK, robot.robot.feet)
-    return robot.carry_on(replace(moment, footing=footing, held=held), point.states)
-
-
-def _rise(linkage: Linkage, moment: Moment, foot: str) -> float:
-    """How fast a foot rises, in m/s."""
-    return float(linkage.foot_jacobian(moment.q, [foot])[1] @ moment.rates)
+    still = touching(robot, robot.moment(point), {foot: Contact.STICK})
+    return robot.carry_on(still, point.states)

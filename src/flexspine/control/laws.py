@@ -1,0 +1,210 @@
+"""Laws that choose torques at one instant, from what joints are to do and which feet stand."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import daqp
+import numpy as np
+
+from flexspine.mechanics.linkage import Array, Linkage
+from flexspine.mechanics.stance import passive_forces, tracked
+
+# What daqp calls equations, inequalities, and a problem that it has solved.
+EQUATION, INEQUALITY = 5, 0
+SOLVED = 1
+BOUNDLESS = 1e30
+
+# Of the tracking residual; makes torques unique where several serve as well.
+SMALL = 1e-8
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A robot at one instant, and what is wanted of it.
+
+    ``feet`` are those that are to stand and do. ``joints`` (3, m) are angle, rate and acceleration
+    that are wanted of the motors' joints, ``links`` those of the swinging legs' links, ``com`` (3, 2)
+    place, velocity and acceleration of the centre of mass. ``limit`` bounds torques, in N m.
+    """
+
+    linkage: Linkage
+    q: Array
+    rates: Array
+    feet: tuple[str, ...]
+    joints: Array
+    links: Mapping[str, Array]
+    com: Array
+    trunk: tuple[str, ...]
+    friction: float
+    limit: float
+
+
+class Law(ABC):
+    """How torques are chosen."""
+
+    name: str
+
+    @abstractmethod
+    def torques(self, now: Situation) -> Array:
+        """The torques (m,). Raises `numpy.linalg.LinAlgError` where there are none."""
+
+
+@dataclass(frozen=True)
+class Tracking(Law):
+    """Computed torque: ``e'' + K_d e' + K_p e = 0`` for every motor's joint.
+
+    ``stiffness`` in 1/s^2, ``damping`` in 1/s.
+    """
+
+    stiffness: float = 400.0
+    damping: float = 40.0
+    name = "tracking"
+
+    def wanted(self, now: Situation) -> Array:
+        """The accelerations of the joints, shape (m,)."""
+        motors = now.linkage.actuation.T
+        angle, rate, acceleration = now.joints
+        back: Array = self.stiffness * (angle - motors @ now.q)
+        return acceleration + back + self.damping * (rate - motors @ now.rates)
+
+    def torques(self, now: Situation) -> Array:
+        """The torques (m,)."""
+        return tracked(now.linkage, now.q, now.rates, now.feet, self.wanted(now)).torques
+
+
+@dataclass(frozen=True)
+class LeastResidual(Tracking):
+    """Computed torque as nearly as dynamics, contacts, friction and limits of torques allow.
+
+    A quadratic program in accelerations, torques and forces; it has an answer where `Tracking`
+    is over- or underdetermined.
+    """
+
+    name = "qp"
+
+    def torques(self, now: Situation) -> Array:
+        """The torques (m,)."""
+        linkage, n = now.linkage, now.linkage.size
+        motors = linkage.actuation
+        m, k = motors.shape[1], 2 * len(now.feet)
+        jacobian = linkage.foot_jacobian(now.q, now.feet)
+        size = n + m + k
+        moves = np.zeros((m, size))
+        moves[:, :n] = motors.T
+        wanted = self.wanted(now)
+        cost = moves.T @ moves
+        cost[range(n, n + m), range(n, n + m)] += SMALL
+        equations = np.zeros((n + k, size))
+        equations[:n, :n] = linkage.mass_matrix(now.q)
+        equations[:n, n : n + m] = -motors
+        equations[:n, n + m :] = -jacobian.T
+        equations[n:, :n] = jacobian
+        right = np.concatenate(
+            [
+                -passive_forces(linkage, now.q, now.rates),
+                -linkage.foot_bias(now.q, now.rates, now.feet),
+            ]
+        )
+        cones = np.zeros((k, size))
+        for i in range(k // 2):
+            t, f = n + m + 2 * i, n + m + 2 * i + 1
+            cones[2 * i, [t, f]] = 1.0, now.friction
+            cones[2 * i + 1, [t, f]] = -1.0, now.friction
+        bounds = np.zeros((m, size))
+        bounds[range(m), range(n, n + m)] = 1.0
+        limits = np.full(m, min(now.limit, BOUNDLESS))
+        rows = np.concatenate([equations, cones, bounds])
+        upper = np.concatenate([right, np.full(k, BOUNDLESS), limits])
+        lower = np.concatenate([right, np.zeros(k), -limits])
+        sense = np.full(len(rows), INEQUALITY, dtype=np.intc)
+        sense[: n + k] = EQUATION
+        found, _, flag, _ = daqp.solve(
+            cost, -moves.T @ wanted, np.ascontiguousarray(rows), upper, lower, sense, eps_prox=1e-6
+        )
+        if flag != SOLVED:
+            raise np.linalg.LinAlgError("no torques within the limits keep the feet on the ground")
+        return np.asarray(found[n : n + m], dtype=float)
+
+
+@dataclass(frozen=True)
+class SevenOutputs(Law):
+    """Centre of mass, mean pitch of the trunk and the swinging legs; the spine moves as it will.
+
+    With two feet on the ground these seven outputs and equal horizontal forces on both make all
+    torques known. ``stiffness`` in 1/s^2, ``damping`` in 1/s.
+    """
+
+    stiffness: float = 400.0
+    damping: float = 40.0
+    name = "com"
+
+    def torques(self, now: Situation) -> Array:
+        """The torques (m,)."""
+        linkage, n = now.linkage, now.linkage.size
+        motors = linkage.actuation
+        m, k = motors.shape[1], 2 * len(now.feet)
+        jacobian = linkage.foot_jacobian(now.q, now.feet)
+        outputs, wanted = self._outputs(now)
+        equal = np.zeros((1 if k == 4 else 0, n + m + k))
+        if k == 4:
+            equal[0, [n + m, n + m + 2]] = 1.0, -1.0
+        rows = len(outputs)
+        matrix = np.concatenate(
+            [
+                np.hstack([linkage.mass_matrix(now.q), -motors, -jacobian.T]),
+                np.hstack([jacobian, np.zeros((k, m + k))]),
+                np.hstack([outputs, np.zeros((rows, m + k))]),
+                equal,
+            ]
+        )
+        right = np.concatenate(
+            [
+                -passive_forces(linkage, now.q, now.rates),
+                -linkage.foot_bias(now.q, now.rates, now.feet),
+                wanted,
+                np.zeros(len(equal)),
+            ]
+        )
+        if matrix.shape[0] == matrix.shape[1]:
+            found = np.linalg.solve(matrix, right)
+        else:
+            found = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return np.asarray(found[n : n + m], dtype=float)
+
+    def _outputs(self, now: Situation) -> tuple[Array, Array]:
+        """Rows of ``q''`` and what they are to be."""
+        linkage, q, rates = now.linkage, now.q, now.rates
+        turns = linkage.to_absolute
+        pitch = np.mean([turns[linkage.place[link]] for link in now.trunk], axis=0)
+        rows = [*linkage.com_jacobian(q), pitch]
+        bias = [*linkage.com_bias(q, rates), 0.0]
+        place = [*linkage.com(q), pitch @ q]
+        aims = [*now.com.T, np.zeros(3)]
+        for link, aim in now.links.items():
+            row = turns[linkage.place[link]]
+            rows.append(row)
+            bias.append(0.0)
+            place.append(row @ q)
+            aims.append(aim)
+        matrix, aim = np.array(rows), np.array(aims)
+        back = self.stiffness * (aim[:, 0] - place) + self.damping * (aim[:, 1] - matrix @ rates)
+        return matrix, aim[:, 2] + back - np.array(bias)
+
+
+@dataclass(frozen=True)
+class JointSprings(Law):
+    """Joints drawn to their angles by springs and dampers, in N m/rad and N m s/rad."""
+
+    stiffness: float = 400.0
+    damping: float = 12.0
+    name = "pd"
+
+    def torques(self, now: Situation) -> Array:
+        """The torques (m,)."""
+        motors = now.linkage.actuation.T
+        angle, rate, _ = now.joints
+        back: Array = self.stiffness * (angle - motors @ now.q)
+        return back + self.damping * (rate - motors @ now.rates)
