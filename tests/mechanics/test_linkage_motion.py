@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flexspine import load_robot
 from flexspine.hybrid.lowering import Lowering
 from flexspine.mechanics.linkage import Linkage
-from flexspine.mechanics.linkage_motion import SETTLING, LinkageMotion, Standing
+from flexspine.mechanics.linkage_motion import SETTLING, LinkageMotion, MaybeStanding, Standing
 from flexspine.mechanics.stance import constrained, passive_forces
 from tests.mechanics.test_linkage import uneven
 
@@ -29,17 +29,24 @@ FRICTION = 0.7
 
 
 class Compiled:
-    """Accelerations and forces as a function of states, torques and anchors."""
+    """Accelerations and forces as a function of states, torques, anchors, and flags if any."""
 
-    def __init__(self, linkage: Linkage, feet: list[str], slides: dict[str, bool] | None = None):
+    def __init__(self, linkage: Linkage, feet: list[str], flagged: bool = False) -> None:
         motion = LinkageMotion(linkage, FRICTION)
         torques = {j.name: sp.Symbol(f"t_{j.name}") for j in linkage.joints if j.actuated}
         anchors = {name: sp.symbols(f"x_{name} y_{name}") for name in feet}
-        standing = [Standing(name, anchors[name], (slides or {}).get(name)) for name in feet]
+        flags = [sp.symbols(f"stands_{name} slides_{name}") for name in feet]
+        standing: list[Standing] = [Standing(name, anchors[name]) for name in feet]
+        if flagged:
+            standing = [
+                MaybeStanding(name, anchors[name], *flag)
+                for name, flag in zip(feet, flags, strict=True)
+            ]
         definitions, accelerations, pushes = motion.stance(standing, torques)
         forces = [part for name in feet for part in pushes[name]]
         inputs = [*motion.coordinates, *motion.rates, *torques.values()]
         inputs += [part for anchor in anchors.values() for part in anchor]
+        inputs += [part for flag in flags for part in flag] if flagged else []
         variables = [hy.expression(f"v{i}") for i in range(len(inputs))]
         known = dict(zip(inputs, variables, strict=True))
         lower = Lowering(known, tuple(motion.values), definitions, 0)
@@ -85,12 +92,36 @@ def test_an_uneven_tree_moves_as_in_numbers(feet: list[str]) -> None:
     assert_same_motion(uneven(), feet, 1.0)
 
 
-@pytest.mark.parametrize("slides", [{"toe_1": True}, {"toe_1": False, "toe_4": True}])
-def test_feet_that_slide_obey_friction_and_momentum(slides: dict[str, bool]) -> None:
+TOES = ["toe_1", "toe_2", "toe_3", "toe_4"]
+
+
+@pytest.mark.parametrize("standing", STANCES, ids=lambda feet: "+".join(feet) or "none")
+def test_flags_tell_feet_that_stand_from_those_in_the_air(standing: list[str]) -> None:
+    linkage = load_robot("sc618").linkage
+    plain, flagged = Compiled(linkage, standing), Compiled(linkage, TOES, flagged=True)
+    flags = np.array([[float(toe in standing), 0.0] for toe in TOES]).ravel()
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        q, rates = rng.uniform(-1.5, 1.5, 12), rng.normal(0, 2, 12)
+        here = absolute(linkage, q), absolute(linkage, rates), rng.normal(0, 5, 8)
+        anchors = {toe: linkage.foot(q, toe) for toe in TOES}
+        few = np.array([anchors[toe] for toe in standing]).ravel()
+        expected = plain(*here, few)
+        found = flagged(*here, np.array(list(anchors.values())).ravel(), flags)
+        size = np.abs(expected[0]).max()
+        np.testing.assert_allclose(found[0], expected[0], atol=1e-11 * size)
+        for toe, force in zip(TOES, found[1], strict=True):
+            wanted = expected[1][standing.index(toe)] if toe in standing else [0.0, 0.0]
+            np.testing.assert_allclose(force, wanted, atol=1e-9 * size)
+
+
+@pytest.mark.parametrize("slides", [{"toe_1": 1}, {"toe_1": -1, "toe_4": 1}], ids=str)
+def test_feet_that_slide_obey_friction_and_momentum(slides: dict[str, int]) -> None:
     """And do not rise; those that stick do not move."""
     linkage = load_robot("sc618").linkage
     feet = ["toe_1", "toe_4"]
-    compiled = Compiled(linkage, feet, slides)
+    compiled = Compiled(linkage, TOES, flagged=True)
+    flags = np.array([[float(toe in feet), slides.get(toe, 0)] for toe in TOES]).ravel()
     rng = np.random.default_rng(7)
     for _ in range(50):
         q, rates = rng.uniform(-1.5, 1.5, 12), rng.normal(0, 2, 12)
@@ -99,18 +130,19 @@ def test_feet_that_slide_obey_friction_and_momentum(slides: dict[str, bool]) -> 
         kept = [row for i, foot in enumerate(feet) for row in (2 * i, 2 * i + 1)
                 if row % 2 or foot not in slides]  # fmt: skip
         rates -= np.linalg.pinv(jacobian[kept]) @ (jacobian[kept] @ rates)
-        anchors = np.array([linkage.foot(q, name) for name in feet]).ravel()
+        anchors = np.array([linkage.foot(q, name) for name in TOES]).ravel()
         here = absolute(linkage, q), absolute(linkage, rates)
-        accelerations, forces = compiled(*here, torques, anchors)
+        accelerations, all_forces = compiled(*here, torques, anchors, flags)
+        forces = all_forces[[TOES.index(foot) for foot in feet]]
         moved = np.linalg.solve(linkage.to_absolute, accelerations)
         inertia = linkage.mass_matrix(q) @ moved + passive_forces(linkage, q, rates)
         given = linkage.actuation @ torques + jacobian.T @ forces.ravel()
         np.testing.assert_allclose(inertia, given, atol=1e-10 * np.abs(forces).max())
         drift = jacobian @ moved + linkage.foot_bias(q, rates, feet)
         assert np.abs(drift[kept]).max() <= 1e-10 * np.abs(accelerations).max()
-        for foot, forward in slides.items():
+        for foot, way in slides.items():
             tangent, normal = forces[feet.index(foot)]
-            assert tangent == pytest.approx((-1 if forward else 1) * FRICTION * normal)
+            assert tangent == pytest.approx(-way * FRICTION * normal)
 
 
 def test_drift_of_a_foot_dies_away() -> None:

@@ -19,10 +19,9 @@ from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
-from flexspine.mechanics.complementarity import Contact
 from flexspine.mechanics.linkage_motion import LinkageMotion, Standing
 from flexspine.mechanics.linkage_tracking import TrackedMotion, follow
-from flexspine.models.articulated import BoundRobot, anchor
+from flexspine.models.articulated import BY, BoundRobot, anchor, stands_in
 from flexspine.models.drive import Moment, Turning
 from flexspine.models.footing import Footing
 
@@ -59,30 +58,25 @@ class ComputedTorque(Walker):
 
     def label(self, moment: Moment) -> str:
         """The feet that the law counts on, where they are not those that stick."""
-        footing = moment.footing
-        counted = self.counted(moment)
-        return "" if _known(counted, footing) else f" by {_named(counted)}"
+        footing, counted = moment.footing, self.counted(moment)
+        known = counted == footing.feet == footing.sticking
+        return "" if known else Footing.sticking_on(counted).name
 
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         """The torques, and the motion where the law knows it."""
-        counted, footing = _feet_of(mode)
-        found = self._law(motion, counted)
-        known = _known(counted, footing)
-        observables = {}
-        for joint, (angle, _, _) in self.references.joints.items():
-            observables[f"reference_{joint}"] = angle
+        found = self._law(motion, mode)
+        known = BY not in mode
         return Turning(
             torques=found.torques,
             definitions={**self.references.definitions, **found.definitions},
-            observables=observables,
+            observables=self.reference_angles,
             accelerations=found.accelerations if known else None,
             forces=found.forces if known else {},
         )
 
     def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
         """Those of walking, and the law's own end."""
-        counted, _ = _feet_of(mode)
-        closeness = self._law(motion, counted).closeness
+        closeness = self._law(motion, mode).closeness
         if closeness is None:
             return super().guards(motion, mode)
         return (
@@ -92,13 +86,15 @@ class ComputedTorque(Walker):
 
     def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
         """The torques, from where the law knows them."""
-        counted, _ = _feet_of(point.mode)
-        found = bound.observe(_named(counted), point.states[None], point.held)
+        counted = Footing.sticking_on(self.counted(bound.moment(point))).name
+        found = bound.observe(counted, point.states[None], point.held)
         return np.array([found[f"torque_{joint}"][0] for joint in self.motors])
 
-    def _law(self, motion: LinkageMotion, feet: tuple[str, ...]) -> TrackedMotion:
+    def _law(self, motion: LinkageMotion, mode: str) -> TrackedMotion:
+        counted = stands_in(self, mode.partition(BY)[2] or mode)
+        assert counted is not None
         wanted = wanted_accelerations(self.references, motion)
-        return follow(motion, [Standing(foot, anchor(foot)) for foot in feet], wanted)
+        return follow(motion, [Standing(foot, anchor(foot)) for foot in counted], wanted)
 
 
 def wanted_accelerations(references: References, motion: LinkageMotion) -> dict[str, sp.Expr]:
@@ -109,23 +105,3 @@ def wanted_accelerations(references: References, motion: LinkageMotion) -> dict[
         + STIFFNESS * (angle - motion.bend(joint))
         for joint, (angle, rate, acceleration) in references.joints.items()
     }
-
-
-def _known(counted: tuple[str, ...], footing: Footing) -> bool:
-    """Whether the feet that the law counts on are those on the ground, and none slides."""
-    return counted == footing.feet == footing.sticking
-
-
-def _named(feet: tuple[str, ...]) -> str:
-    return Footing(tuple((foot, Contact.STICK) for foot in feet)).name
-
-
-def _feet_of(mode: str) -> tuple[tuple[str, ...], Footing]:
-    """The feet that the law counts on in a mode, and its footing."""
-    name, _, counted = mode.partition(" by ")
-    footing = Footing.named(name)
-    if not counted:
-        return footing.feet, footing
-    return Footing.named(counted).feet, footing
-
-

@@ -198,8 +198,8 @@ class SevenOutputs(Law):
 class JointSprings(Law):
     """Joints drawn to their angles by springs and dampers, in N m/rad and N m s/rad."""
 
-    stiffness: float = 400.0
-    damping: float = 12.0
+    stiffness: float = 300.0
+    damping: float = 5.0
     name = "pd"
 
     def torques(self, now: Situation) -> Array:

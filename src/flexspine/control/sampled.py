@@ -9,11 +9,10 @@ import numpy as np
 import sympy as sp
 
 from flexspine.control.computed_torque import SINGULAR
-from flexspine.control.laws import Law, Situation, Tracking
-from flexspine.control.references import BODY
+from flexspine.control.laws import Law, Tracking
 from flexspine.control.walking import Walker
 from flexspine.hybrid.compile import Array, BoundSystem
-from flexspine.hybrid.outcome import Outcome
+from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion
@@ -21,6 +20,15 @@ from flexspine.models.articulated import CLOCK, BoundRobot
 from flexspine.models.drive import Moment, Turning
 
 NEXT_SAMPLE = sp.Symbol("next_sample", real=True)
+
+# rad/s; no joint of a robot that is under control turns as fast.
+FASTEST = 1e3
+
+OUT_OF_CONTROL = OutcomeKind(
+    "out_of_control",
+    "torques that are held for so long shake the joints ever more; sample more often, or lower "
+    "the stiffness and damping of the law",
+)
 
 
 @dataclass(frozen=True)
@@ -37,8 +45,7 @@ class Sampled(Walker):
 
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         """Torques are held."""
-        observables = {f"reference_{j}": angle for j, (angle, _, _) in self.references.joints.items()}
-        return Turning(self._torques, self.references.definitions, observables)
+        return Turning(self._torques, self.references.definitions, self.reference_angles)
 
     def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
         """Those of walking, and the clock of the computer."""
@@ -56,7 +63,7 @@ class Sampled(Walker):
 
     def sample(self, moment: Moment) -> Moment:
         """Choose new torques. Raises `numpy.linalg.LinAlgError` where there are none."""
-        chosen = self.law.torques(self._situation(moment)).clip(-self.limit, self.limit)
+        chosen = self.law.torques(self.situation(moment, self.limit)).clip(-self.limit, self.limit)
         torques = dict(zip(self._torques.values(), chosen.tolist(), strict=True))
         # Counted, so that no rounding errors add up.
         count = round(moment.time * self.rate) + 1
@@ -67,42 +74,16 @@ class Sampled(Walker):
     def _torques(self) -> dict[str, sp.Symbol]:
         return {joint: sp.Symbol(f"held_torque_{joint}", real=True) for joint in self.motors}
 
-    @cached_property
-    def _trunk(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(leg.trunk for leg in self.walk.legs.values()))
-
-    @cached_property
-    def _com_at_start(self) -> Array:
-        """Of the body at its place zero."""
-        return np.asarray(self.robot.linkage.com(self.posture(self.walk.begin())), dtype=float)
-
-    def _situation(self, moment: Moment) -> Situation:
-        joints, links = self.references_at(moment)
-        swinging = [self.walk.legs[name] for name in self.walk.swinging(moment.held)]
-        held, since = moment.held, moment.time - moment.held[BODY.start]
-        course = np.zeros((3, 2))
-        course[0] = self._com_at_start
-        course[0, 0] += held[BODY.x] + held[BODY.speed] * since + held[BODY.gain] * since**2 / 2
-        course[1:, 0] = held[BODY.speed] + held[BODY.gain] * since, held[BODY.gain]
-        return Situation(
-            linkage=self.robot.linkage,
-            q=moment.q,
-            rates=moment.rates,
-            feet=self.counted(moment),
-            joints=joints,
-            links={link: links[link] for leg in swinging for link in (leg.thigh, leg.shank)},
-            com=course,
-            trunk=self._trunk,
-            friction=self.robot.friction,
-            limit=self.limit,
-        )
-
 
 def _sampled(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:
     """The computer chooses new torques."""
     assert isinstance(bound, BoundRobot)
     drive, moment = bound.drive, bound.moment(point)
     assert isinstance(drive, Sampled)
+    fastest = float(np.abs(moment.rates[:-2]).max())
+    if not fastest < FASTEST:
+        text = f"a joint turns at {fastest:.3g} rad/s at t = {moment.time:.6g} s"
+        return Outcome(OUT_OF_CONTROL, text)
     try:
         chosen = drive.sample(moment)
     except np.linalg.LinAlgError as failure:

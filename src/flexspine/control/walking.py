@@ -15,6 +15,7 @@ from math import inf
 import numpy as np
 import sympy as sp
 
+from flexspine.control.laws import Situation
 from flexspine.control.references import (
     BODY,
     FootPath,
@@ -42,6 +43,9 @@ EARLIEST_LANDING = 0.5
 
 # Of the stretched leg; beyond this angles change without bounds.
 LONGEST = 0.999
+
+# s; guards have to be finite for events to be found.
+NEVER = 1e9
 
 OUT_OF_REACH = OutcomeKind(
     "out_of_reach",
@@ -114,7 +118,7 @@ class Walk:
     def begin(self) -> dict[sp.Symbol, float]:
         """Stand with all feet below the hips, about to lift the first pair."""
         held = {BODY.x: 0.0, BODY.speed: 0.0, BODY.gain: 0.0, BODY.start: 0.0}
-        held |= {BODY.height: self.gait.height, STEP: -1.0, SWING_END: inf}
+        held |= {BODY.height: self.gait.height, STEP: -1.0, SWING_END: NEVER}
         for name, leg in self.legs.items():
             held |= _stand(name, leg.hip, 0.0)
         return self._next_step(held, 0.0)
@@ -143,7 +147,7 @@ class Walk:
                 path = FootPath.of(name)
                 new |= _stand(name, held[path.x] + held[path.stride], 0.0)
                 new |= {path.sink: self.gait.landing, path.start: time}
-        return new | {SWING_END: inf}
+        return new | {SWING_END: NEVER}
 
     def _next_step(self, held: dict[sp.Symbol, float], time: float) -> dict[sp.Symbol, float]:
         """Change pairs."""
@@ -205,14 +209,64 @@ class Walker(Drive):
         return [joint for joint, (_, motor) in self.robot.joints.items() if motor]
 
     @cached_property
+    def _measures(self) -> dict[sp.Symbol, float]:
+        return leg_numbers(self.walk.legs)
+
+    @cached_property
     def _reference_function(self) -> ReferenceFunction:
-        inputs = [CLOCK, *self.walk.begin(), *leg_numbers(self.walk.legs)]
+        inputs = [CLOCK, *self.walk.begin(), *self._measures]
         return ReferenceFunction(self.references, self.motors, inputs)
 
     def references_at(self, moment: Moment) -> tuple[Array, dict[str, Array]]:
         """Angle, rate and acceleration of the motors' joints, shape (3, m), and of links (3,)."""
-        known = {**moment.held, **leg_numbers(self.walk.legs), CLOCK: moment.time}
+        known = {**moment.held, **self._measures, CLOCK: moment.time}
         return self._reference_function(known)
+
+    @cached_property
+    def _trunk(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(leg.trunk for leg in self.walk.legs.values()))
+
+    @cached_property
+    def _com_at_start(self) -> Array:
+        """Of the body at its place zero."""
+        return np.asarray(self.robot.linkage.com(self.posture(self.walk.begin())), dtype=float)
+
+    @property
+    def usual(self) -> tuple[tuple[str, ...], ...]:
+        """The feet of either pair."""
+        return tuple(self._feet(pair) for pair in self.walk.pairs)
+
+    def _feet(self, legs: tuple[str, ...]) -> tuple[str, ...]:
+        """The feet of some legs, in the robot's order."""
+        feet = {self.walk.legs[name].foot for name in legs}
+        return tuple(foot for foot in self.robot.feet if foot in feet)
+
+    def situation(self, moment: Moment, limit: float = inf) -> Situation:
+        """What a law needs to know; ``limit`` bounds torques, in N m."""
+        joints, links = self.references_at(moment)
+        swinging = [self.walk.legs[name] for name in self.walk.swinging(moment.held)]
+        held, since = moment.held, moment.time - moment.held[BODY.start]
+        course = np.zeros((3, 2))
+        course[0] = self._com_at_start
+        course[0, 0] += held[BODY.x] + held[BODY.speed] * since + held[BODY.gain] * since**2 / 2
+        course[1:, 0] = held[BODY.speed] + held[BODY.gain] * since, held[BODY.gain]
+        return Situation(
+            linkage=self.robot.linkage,
+            q=moment.q,
+            rates=moment.rates,
+            feet=self.counted(moment),
+            joints=joints,
+            links={link: links[link] for leg in swinging for link in (leg.thigh, leg.shank)},
+            com=course,
+            trunk=self._trunk,
+            friction=self.robot.friction,
+            limit=limit,
+        )
+
+    @cached_property
+    def reference_angles(self) -> dict[str, sp.Expr]:
+        """Where joints are to be, by the name that it is observed under."""
+        return {f"reference_{j}": angle for j, (angle, _, _) in self.references.joints.items()}
 
     def held(self) -> tuple[sp.Symbol, ...]:
         """The plan's numbers."""
@@ -220,7 +274,7 @@ class Walker(Drive):
 
     def values(self) -> dict[sp.Symbol, float]:
         """What the legs measure."""
-        return leg_numbers(self.walk.legs)
+        return self._measures
 
     def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
         """The end of a swing; and no leg is longer than it is."""
@@ -237,13 +291,12 @@ class Walker(Drive):
 
     def counted(self, moment: Moment) -> tuple[str, ...]:
         """The feet that are to stand. A foot that bounces or slides for a moment still counts."""
-        standing = {self.walk.legs[name].foot for name in self.walk.standing(moment.held)}
-        return tuple(foot for foot in self.robot.feet if foot in standing)
+        return self._feet(self.walk.standing(moment.held))
 
     def posture(self, held: Mapping[sp.Symbol, float]) -> Array:
         """``q`` as it is to be at the beginning."""
         linkage, q = self.robot.linkage, np.zeros(self.robot.linkage.size)
-        known = {**held, **leg_numbers(self.walk.legs), CLOCK: 0.0}
+        known = {**held, **self._measures, CLOCK: 0.0}
         for link, (angle, _, _) in self._reference_function(known)[1].items():
             q[linkage.place[link]] = angle
         q = linkage.to_relative @ q

@@ -63,8 +63,10 @@ def resolve(
     before: Array,
     friction: float | None,
     moving: Sequence[Contact | None] | None = None,
+    *,
+    count: bool = True,
 ) -> Resolution:
-    """Find what touching feet do, sticking first.
+    """Find what touching feet do, sticking first; without ``count`` the first answer will do.
 
     ``response`` is ``W`` (2k, 2k), ``before`` the feet's motion without pushes (2k,), x and y in
     turn. ``friction`` None: feet that touch do not slide. ``moving`` names the feet that slide
@@ -72,7 +74,8 @@ def resolve(
     independently, as those at both ends of one link, pushes are the least ones.
     """
     feet = len(before) // 2
-    combinations = _combinations(tuple(moving or (None,) * feet), friction is not None)
+    whole = _combinations(tuple(moving or (None,) * feet), friction is not None)
+    combinations = whole if count else whole[:1]
     pushes = _solve(combinations, response, before, friction or 0.0)
     after = before + pushes @ response.T
     slides_already = np.array([each is not None for each in moving or (None,) * feet])
@@ -82,6 +85,8 @@ def resolve(
         apart = (np.abs(after[number] - after[other]).max() for other in distinct)
         if all(distance > SAME * np.abs(before).max() for distance in apart):
             distinct.append(number)
+    if not (distinct or count):
+        return resolve(response, before, friction, moving)
     if not distinct:
         return Resolution(Verdict.NONE, (Contact.OPEN,) * feet, np.zeros((feet, 2)), 0)
     chosen = distinct[0]

@@ -149,26 +149,31 @@ class Linkage:
 
     def point(self, q: Array, link: str, distance: float) -> Array:
         """Where a point of a link is, shape (..., 2)."""
-        arms, angles = self.arms(link, distance), self.angles(q)
-        return q[..., -2:] + np.stack([np.cos(angles) @ arms, np.sin(angles) @ arms], axis=-1)
+        return self._point(q, self.arms(link, distance))
 
     def foot(self, q: Array, name: str) -> Array:
         """Where a foot is, shape (..., 2)."""
-        foot = self._foot(name)
-        return self.point(q, foot.link, foot.at)
+        return self._point(q, self._foot_arms[name])
 
     def com(self, q: Array) -> Array:
         """Where the centre of mass of all is, shape (..., 2)."""
-        arms, angles = self.moments / self.mass, self.angles(q)
-        return q[..., -2:] + np.stack([np.cos(angles) @ arms, np.sin(angles) @ arms], axis=-1)
+        return self._point(q, self.moments / self.mass)
+
+    def _point(self, q: Array, arms: Array) -> Array:
+        """Where a point with these lever arms is."""
+        angles = self.angles(q)
+        place = q[..., -2:].copy()
+        place[..., 0] += np.cos(angles) @ arms
+        place[..., 1] += np.sin(angles) @ arms
+        return place
 
     def com_jacobian(self, q: Array) -> Array:
         """The velocity of the centre of mass by ``q'``, shape (..., 2, N)."""
-        return self._jacobian(q, [self.moments / self.mass])
+        return self._jacobian(q, self.moments[None] / self.mass)
 
     def com_bias(self, q: Array, rates: Array) -> Array:
         """The acceleration of the centre of mass without ``q''``, shape (..., 2)."""
-        return self._bias(q, rates, [self.moments / self.mass])
+        return self._bias(q, rates, self.moments[None] / self.mass)
 
     def mass_matrix(self, q: Array) -> Array:
         """``D`` of ``D q'' + C q' + G = Q``, shape (..., N, N)."""
@@ -186,29 +191,31 @@ class Linkage:
         """``C q'``, centrifugal and Coriolis forces, shape (..., N)."""
         angles, squares = self.angles(q), self.angles(rates) ** 2
         apart = np.sin(angles[..., :, None] - angles[..., None, :])
-        torques = ((self.inertias * apart) @ squares[..., None])[..., 0]
-        push = -np.stack([np.cos(angles), np.sin(angles)], axis=-2) * self.moments
-        base = (push @ squares[..., None])[..., 0]
-        result: Array = np.concatenate([torques, base], axis=-1) @ self.to_absolute
-        return result
+        forces = np.empty(q.shape)
+        forces[..., :-2] = ((self.inertias * apart) @ squares[..., None])[..., 0] @ self._chains
+        forces[..., -2] = -(squares * np.cos(angles)) @ self.moments
+        forces[..., -1] = -(squares * np.sin(angles)) @ self.moments
+        return forces
 
     def potential_forces(self, q: Array) -> Array:
         """``G``, the gradient of the potential energy, springs included, shape (..., N)."""
-        weights = np.zeros(q.shape)
-        weights[..., :-2] = self.gravity * self.moments * np.cos(self.angles(q))
-        weights[..., -1] = self.gravity * self.mass
-        forces: Array = weights @ self.to_absolute
-        for joint in self.joints:
-            number = self.place[joint.name]
-            forces[..., number] += joint.stiffness * (q[..., number] - joint.rest)
+        stiffness, rests, _ = self._springs
+        forces = stiffness * (q - rests)
+        forces[..., :-2] += self.gravity * self.moments * np.cos(self.angles(q)) @ self._chains
+        forces[..., -1] += self.gravity * self.mass
         return forces
 
     def damping_forces(self, rates: Array) -> Array:
         """What the dampers of the joints take up, ``c q'``, shape (..., N)."""
-        damping = np.zeros(self.size)
+        return self._springs[2] * rates
+
+    @cached_property
+    def _springs(self) -> Array:
+        """Stiffness, rest angle and damping by coordinate, shape (3, N)."""
+        table = np.zeros((3, self.size))
         for joint in self.joints:
-            damping[self.place[joint.name]] = joint.damping
-        return damping * rates
+            table[:, self.place[joint.name]] = joint.stiffness, joint.rest, joint.damping
+        return table
 
     @cached_property
     def actuation(self) -> Array:
@@ -219,35 +226,32 @@ class Linkage:
 
     def point_jacobian(self, q: Array, link: str, distance: float) -> Array:
         """The velocity of a point of a link by ``q'``, shape (..., 2, N)."""
-        return self._jacobian(q, [self.arms(link, distance)])
+        return self._jacobian(q, self.arms(link, distance)[None])
 
     def foot_jacobian(self, q: Array, feet: Iterable[str]) -> Array:
         """``J``, the velocities of feet by ``q'``: x and y in turn, shape (..., 2 feet, N)."""
-        return self._jacobian(q, [self.foot_arms(name) for name in feet])
+        return self._jacobian(q, self._feet_arms(feet))
 
-    def _jacobian(self, q: Array, points: list[Array]) -> Array:
-        """The velocities of points with these lever arms."""
-        angles = self.angles(q)
-        rows = []
-        for arms in points:
-            for column, turned in enumerate((-arms * np.sin(angles), arms * np.cos(angles))):
-                base = np.broadcast_to(np.eye(2)[column], (*q.shape[:-1], 2))
-                rows.append(np.concatenate([turned, base], axis=-1))
-        whole = np.array(rows).reshape(2 * len(points), *q.shape[:-1], self.size)
-        result: Array = np.moveaxis(whole, 0, -2) @ self.to_absolute
-        return result
+    def _jacobian(self, q: Array, arms: Array) -> Array:
+        """The velocities of points with these lever arms (k, n)."""
+        angles, n = self.angles(q), len(self.links)
+        rows = np.zeros((*q.shape[:-1], 2 * len(arms), self.size))
+        rows[..., ::2, :n] = -arms * np.sin(angles)[..., None, :] @ self._chains
+        rows[..., 1::2, :n] = arms * np.cos(angles)[..., None, :] @ self._chains
+        rows[..., ::2, n] = rows[..., 1::2, n + 1] = 1.0
+        return rows
 
     def foot_bias(self, q: Array, rates: Array, feet: Iterable[str]) -> Array:
         """``J' q'``, the accelerations of feet without ``q''``, shape (..., 2 feet)."""
-        return self._bias(q, rates, [self.foot_arms(name) for name in feet])
+        return self._bias(q, rates, self._feet_arms(feet))
 
-    def _bias(self, q: Array, rates: Array, points: list[Array]) -> Array:
-        """The accelerations of points with these lever arms, without ``q''``."""
+    def _bias(self, q: Array, rates: Array, arms: Array) -> Array:
+        """The accelerations of points with these lever arms (k, n), without ``q''``."""
         angles, squares = self.angles(q), self.angles(rates) ** 2
-        parts = []
-        for arms in points:
-            parts += [-(squares * np.cos(angles)) @ arms, -(squares * np.sin(angles)) @ arms]
-        return np.moveaxis(np.array(parts).reshape(2 * len(points), *q.shape[:-1]), 0, -1)
+        found = np.empty((*q.shape[:-1], 2 * len(arms)))
+        found[..., ::2] = -(squares * np.cos(angles)) @ arms.T
+        found[..., 1::2] = -(squares * np.sin(angles)) @ arms.T
+        return found
 
     def kinetic_energy(self, q: Array, rates: Array) -> Array:
         """In J, shape (...)."""
@@ -263,10 +267,15 @@ class Linkage:
             energy = energy + joint.stiffness * bend**2 / 2
         return energy
 
-    def _foot(self, name: str) -> Foot:
-        return next(foot for foot in self.feet if foot.name == name)
+    @cached_property
+    def _foot_arms(self) -> dict[str, Array]:
+        return {foot.name: self.arms(foot.link, foot.at) for foot in self.feet}
 
     def foot_arms(self, name: str) -> Array:
         """The lever arms of a foot, shape (n,)."""
-        foot = self._foot(name)
-        return self.arms(foot.link, foot.at)
+        return self._foot_arms[name]
+
+    def _feet_arms(self, feet: Iterable[str]) -> Array:
+        """The lever arms of some feet, shape (k, n)."""
+        arms = [self._foot_arms[name] for name in feet]
+        return np.array(arms) if arms else np.zeros((0, len(self.links)))

@@ -30,11 +30,27 @@ def _symbol(name: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class Standing:
-    """A foot on the ground: it keeps to its ``anchor``, or slides over it, forward or not."""
+    """A foot on the ground that keeps to its ``anchor``."""
 
     name: str
     anchor: Point
-    slides: bool | None = None
+
+
+@dataclass(frozen=True)
+class MaybeStanding(Standing):
+    """A foot of which flags tell what it does, so that one field serves for all that it may do.
+
+    ``stands`` is 1 on the ground and 0 in the air, ``slides`` 1 if it slides forward, -1 back, 0
+    if it does not.
+    """
+
+    stands: sp.Symbol
+    slides: sp.Symbol
+
+    @property
+    def sticks(self) -> sp.Expr:
+        """1 if it stands and does not slide, 0 otherwise."""
+        return self.stands * (1 - self.slides**2)
 
 
 @dataclass(frozen=True)
@@ -179,55 +195,51 @@ class LinkageMotion:
 
         Returns definitions in order, accelerations of `coordinates` and the forces on the feet.
         """
-        held, pushes, needed = self._contacts(feet)
+        rows, bias = self.foot_rows([foot.name for foot in feet])
+        count = rows.rows
         order = list(range(len(self.coordinates)))[::-1]
         order = [*order[2:], *sorted(order[:2])]  # from the ends of the tree to the base
         matrix = self.mass_matrix().extract(order, order)
         free = self.forces(torques)
-        columns = [[row[i] for i in order] for row in (free, *pushes)]
+        columns = [[row[i] for i in order] for row in (free, *rows.tolist())]
         definitions, solved = solve(matrix, columns, "whole_")
         back = [order.index(i) for i in range(len(order))]
         alone, *spread = ([column[i] for i in back] for column in solved)
         if not feet:
             return {**self.definitions, **definitions}, alone, {}
-        count = len(held)
-        response = sp.Matrix(count, count, lambda i, j: _dot(held[i], spread[j]))
-        missing = [needed[i] - _dot(held[i], alone) for i in range(count)]
-        sticks = all(foot.slides is None for foot in feet)
-        more, (sizes,) = solve(response, [missing], "feet_", symmetric=sticks)
+        response = sp.Matrix(count, count, lambda i, j: _dot(rows.row(i), spread[j]))
+        settling = [part for foot in feet for part in self.settling(foot)]
+        missing = [settling[i] - bias[i] - _dot(rows.row(i), alone) for i in range(count)]
+        flagged = any(isinstance(foot, MaybeStanding) for foot in feet)
+        if flagged:
+            response, missing = self._flagged(feet, response, missing)
+        more, (forces,) = solve(response, [missing], "feet_", symmetric=not flagged)
         accelerations = [
-            alone[c] + sum(spread[r][c] * sizes[r] for r in range(count)) for c in range(len(order))
+            alone[c] + sum(spread[r][c] * forces[r] for r in range(count))
+            for c in range(len(order))
         ]
-        forces = self._forces_on(feet, sizes)
-        return {**self.definitions, **definitions, **more}, accelerations, forces
+        by_foot = {foot.name: (forces[2 * i], forces[2 * i + 1]) for i, foot in enumerate(feet)}
+        return {**self.definitions, **definitions, **more}, accelerations, by_foot
 
-    def _contacts(
-        self, feet: Sequence[Standing]
-    ) -> tuple[list[Row], list[Row], list[sp.Expr]]:
-        """What contacts hold, where they push, and the accelerations that they keep there.
+    def _flagged(
+        self, feet: Sequence[Standing], response: sp.Matrix, missing: Sequence[sp.Expr]
+    ) -> tuple[sp.Matrix, list[sp.Expr]]:
+        """The equations of forces on feet that may stick, slide or be open.
 
-        Nothing moves where a contact holds; what rounding brings there dies away.
+        A foot that slides forward is pushed back, by the friction that its normal force allows.
         """
-        held: list[Row] = []
-        pushes: list[Row] = []
-        needed: list[sp.Expr] = []
-        for foot in feet:
-            rows, bias = self.foot_rows([foot.name])
-            along, up = list(rows.row(0)), list(rows.row(1))
-            if foot.slides is None:
-                held += [along, up]
-                pushes += [along, up]
-                kept = (0, 1)
-            else:
-                # Friction on a foot that slides forward points back.
-                way = -1 if foot.slides else 1
-                friction = self.parameter("friction", self.friction)
-                held.append(up)
-                pushes.append([n + way * friction * t for n, t in zip(up, along, strict=True)])
-                kept = (1,)
-            settling = self.settling(foot)
-            needed += [settling[axis] - bias[axis] for axis in kept]
-        return held, pushes, needed
+        friction, size = self.parameter("friction", self.friction), response.rows
+        matrix, right = sp.zeros(size, size), []
+        for number, foot in enumerate(feet):
+            assert isinstance(foot, MaybeStanding)
+            t, n = 2 * number, 2 * number + 1
+            for row, holds in ((t, foot.sticks), (n, foot.stands)):
+                for column in range(size):
+                    matrix[row, column] = holds * response[row, column]
+                matrix[row, row] += 1 - holds
+                right.append(holds * missing[row])
+            matrix[t, n] += (1 - foot.sticks) * foot.slides * friction
+        return matrix, right
 
     def settling(self, foot: Standing) -> Point:
         """The acceleration that takes a foot back to its anchor, from which rounding moved it."""

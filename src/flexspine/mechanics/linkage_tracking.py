@@ -45,7 +45,7 @@ def follow(
     linkage = motion.linkage
     free = _free_columns(linkage)
     count = len(free)
-    if 2 * len(feet) > count or any(foot.slides is not None for foot in feet):
+    if 2 * len(feet) > count:
         raise ValueError(f"{len(feet)} feet hold what the motors are to move")
     definitions = dict(motion.definitions)
     given: list[sp.Expr] = []

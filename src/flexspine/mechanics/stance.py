@@ -15,6 +15,12 @@ from flexspine.mechanics.complementarity import Contact, Resolution, resolve
 from flexspine.mechanics.linkage import Array, Linkage
 
 
+TOO_MUCH = "the feet hold what the motors are to move"
+
+# Relative; what is left of equations that cannot be solved is of order one.
+UNSOLVED = 1e-6
+
+
 class Motion(NamedTuple):
     """Accelerations (N,) and forces on k feet, shape (k, 2) in N."""
 
@@ -60,10 +66,12 @@ def tracked(
     """
     n, motors, k = linkage.size, linkage.actuation.T, 2 * len(feet)
     held = np.concatenate([linkage.foot_jacobian(q, feet), motors])
-    if np.linalg.matrix_rank(held) < len(held):
-        raise np.linalg.LinAlgError("the feet hold what the motors are to move")
     needed = np.concatenate([-linkage.foot_bias(q, rates, feet), wanted])
+    if len(held) > n:
+        raise np.linalg.LinAlgError(TOO_MUCH)
     solved = _solve(linkage, q, held, -passive_forces(linkage, q, rates), needed)
+    if not np.abs(held @ solved[:n] - needed).max() <= UNSOLVED * (1 + np.abs(needed).max()):
+        raise np.linalg.LinAlgError(TOO_MUCH)
     return Tracked(solved[:n], solved[n : n + k].reshape(-1, 2), solved[n + k :])
 
 
@@ -87,7 +95,7 @@ def supported(
     solved = np.linalg.solve(linkage.mass_matrix(q), columns)
     spread, free = solved[:, :-1], solved[:, -1]
     before = jacobian @ free + linkage.foot_bias(q, rates, feet)
-    found = resolve(jacobian @ spread, before, friction, moving)
+    found = resolve(jacobian @ spread, before, friction, moving, count=False)
     return found, free + spread @ found.pushes.ravel()
 
 
@@ -102,4 +110,8 @@ def _solve(linkage: Linkage, q: Array, held: Array, applied: Array, needed: Arra
     """Accelerations with ``held q'' = needed`` and the forces along ``held`` for them."""
     count = len(held)
     matrix = np.block([[linkage.mass_matrix(q), -held.T], [held, np.zeros((count, count))]])
-    return np.asarray(np.linalg.solve(matrix, np.concatenate([applied, needed])), dtype=float)
+    try:
+        solved = np.linalg.solve(matrix, np.concatenate([applied, needed]))
+    except np.linalg.LinAlgError:
+        raise np.linalg.LinAlgError(TOO_MUCH) from None
+    return np.asarray(solved, dtype=float)

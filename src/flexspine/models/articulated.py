@@ -1,11 +1,14 @@
 """A planar robot on flat ground as a hybrid system.
 
-Its modes are footings: which feet touch the ground, and which of those slide. A foot lands when it
-comes down to the ground: a plastic impact with friction (`flexspine.mechanics.impact`). It lifts
-off when its normal force falls through zero, begins to slide when the tangential one leaves the
-friction cone, and stops sliding when its velocity falls through zero. Whenever forces jump, at
-impacts and when a controller changes its mind, what every touching foot does next is found anew
-(`flexspine.mechanics.stance.supported`). What turns the motors is a `Drive`.
+A foot lands when it comes down to the ground: a plastic impact with friction
+(`flexspine.mechanics.impact`). It lifts off when its normal force falls through zero, begins to
+slide when the tangential one leaves the friction cone, and stops sliding when its velocity falls
+through zero. Whenever forces jump, at impacts and when a controller changes its mind, what every
+touching foot does next is found anew (`flexspine.mechanics.stance.supported`). What turns the
+motors is a `Drive`.
+
+Which feet stand and which slide is its footing. Footings that last have a mode of their own; all
+others, most of them over within milliseconds, share one in which flags tell what each foot does.
 """
 
 from __future__ import annotations
@@ -23,16 +26,19 @@ from flexspine.hybrid.system import Guard, HybridSystem, Mode, Section
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.complementarity import Contact, Verdict
 from flexspine.mechanics.impact import Impact, impact
-from flexspine.mechanics.linkage import Linkage
-from flexspine.mechanics.linkage_motion import LinkageMotion, Point, Standing
+from flexspine.mechanics.linkage_motion import LinkageMotion, MaybeStanding, Point, Standing
 from flexspine.mechanics.stance import stopped, supported
 from flexspine.models.bounder import FELL
 from flexspine.models.drive import Drive, Moment, Turning
-from flexspine.models.footing import Footing
+from flexspine.models.footing import Footing, flags_of
 from flexspine.models.robot import Robot
 
 CLOCK, WORK, DISSIPATED = sp.symbols("clock motor_work dissipated_energy", real=True)
 LOSS, PUSH_TIME = sp.symbols("impact_loss push_time", real=True)
+
+# The mode of all footings that have none of their own, and what leads to a drive's label.
+ANY = "any footing"
+BY = " by "
 
 # N; contact forces may be out of their cones by this much, which is more than rounding errors, so
 # that a foot at the edge is found to leave it.
@@ -158,16 +164,22 @@ class BoundRobot(BoundSystem):
         held = dict(zip(self.system.held, point.held.tolist(), strict=True))
         back = self.linkage.to_relative
         q, rates = back @ point.states[:n], back @ point.states[n : 2 * n]
-        footing = Footing.named(point.mode.partition(" by ")[0])
+        footing = Footing.in_flags(held, self.robot.feet)
         return Moment(point.time, q, rates, footing, held)
 
     def point(self, moment: Moment, states: Array) -> HybridState:
         """The point of a moment; what else flows is that of ``states``."""
         n, to = self.linkage.size, self.linkage.to_absolute
-        held = np.array([moment.held[symbol] for symbol in self.system.held])
+        numbers = moment.held | moment.footing.flags(self.robot.feet)
+        held = np.array([numbers[symbol] for symbol in self.system.held])
         new = np.concatenate([states[:n], to @ moment.rates, states[2 * n :]])
-        mode = moment.footing.name + self.drive.label(moment)
-        return HybridState(moment.time, mode, new, held)
+        return HybridState(moment.time, self._mode_of(moment), new, held)
+
+    def _mode_of(self, moment: Moment) -> str:
+        footing = moment.footing
+        usual = footing.feet in self.drive.usual and footing.feet == footing.sticking
+        label = self.drive.label(moment)
+        return (footing.name if usual else ANY) + (BY + label if label else "")
 
     def stand(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> Moment:
         """The beginning of time; feet within rounding error of the ground are on it."""
@@ -244,7 +256,11 @@ def articulated_system(build: Build) -> HybridSystem:
     """Assemble the hybrid system of all driven robots of one build."""
     drive, robot = build.drive, build.drive.robot
     motion = complete_motion(robot)
-    held = [symbol for foot in robot.feet for symbol in (*anchor(foot), *impulse(foot))]
+    held = [
+        symbol
+        for foot in robot.feet
+        for symbol in (*flags_of(foot), *anchor(foot), *impulse(foot))
+    ]
     built: dict[str, Mode] = {}
 
     def mode(name: str) -> Mode:
@@ -264,6 +280,14 @@ def articulated_system(build: Build) -> HybridSystem:
     )
 
 
+def stands_in(drive: Drive, mode: str) -> tuple[str, ...] | None:
+    """The feet that stick in a mode, None where flags tell what they do."""
+    name = mode.partition(BY)[0]
+    if name == ANY:
+        return None
+    return next(feet for feet in drive.usual if Footing.sticking_on(feet).name == name)
+
+
 @dataclass(frozen=True)
 class _Footed:
     """One mode in the making."""
@@ -277,8 +301,8 @@ class _Footed:
         return self.drive.robot
 
     @cached_property
-    def footing(self) -> Footing:
-        return Footing.named(self.name.partition(" by ")[0])
+    def usual(self) -> tuple[str, ...] | None:
+        return stands_in(self.drive, self.name)
 
     @cached_property
     def turning(self) -> Turning:
@@ -289,9 +313,7 @@ class _Footed:
         definitions = {**motion.definitions, **turning.definitions}
         accelerations, forces = turning.accelerations, turning.forces
         if accelerations is None:
-            slides = {Contact.STICK: None, Contact.SLIDE_FORWARD: True, Contact.SLIDE_BACK: False}
-            feet = [Standing(f, anchor(f), slides[does]) for f, does in self.footing.contacts]
-            more, accelerations, forces = motion.stance(feet, turning.torques)
+            more, accelerations, forces = motion.stance(self._standing(), turning.torques)
             definitions |= more
         n = len(motion.coordinates)
         return Mode(
@@ -321,12 +343,14 @@ class _Footed:
             },
         )
 
+    def _standing(self) -> list[Standing]:
+        if self.usual is not None:
+            return [Standing(foot, anchor(foot)) for foot in self.usual]
+        return [MaybeStanding(foot, anchor(foot), *flags_of(foot)) for foot in self.robot.feet]
+
     def _motor_power(self) -> sp.Expr:
         return sum(
-            (
-                torque * self.motion.bend_rate(name)
-                for name, torque in self.turning.torques.items()
-            ),
+            (torque * self.motion.bend_rate(name) for name, torque in self.turning.torques.items()),
             sp.S.Zero,
         )
 
@@ -336,39 +360,60 @@ class _Footed:
         for joint in self.robot.linkage.joints:
             damping = self.motion.parameter(f"{joint.name}_damping", joint.damping)
             lost += damping * self.motion.bend_rate(joint.name) ** 2
-        for foot, does in self.footing.contacts:
-            if does is not Contact.STICK:
-                lost -= forces[foot][0] * self.motion.foot_velocity(foot)[0]
+        if self.usual is None:
+            for foot, (tangent, _) in forces.items():
+                _, slides = flags_of(foot)
+                lost -= slides**2 * tangent * self.motion.foot_velocity(foot)[0]
         return lost
 
     def _contact(self, foot: str, forces: Mapping[str, Point]) -> list[Guard]:
-        """What ends a foot's contact, or brings it about."""
-        does = self.footing.does(foot)
-        if does is Contact.OPEN:
-            height = self.motion.foot(foot)[1]
-            return [Guard(f"{foot} touchdown", height + DEPTH, decide=partial(_landed, foot))]
-        tangent, normal = forces[foot]
+        """What ends a foot's contact, or brings it about.
+
+        Where flags tell what a foot does, guards of what it does not do stay above zero.
+        """
+        touches = self._touchdown(foot)
+        if self.usual is not None:
+            return self._grips(foot, *forces[foot]) if foot in self.usual else [touches]
+        stands, slides = flags_of(foot)
+        sticks = stands * (1 - slides**2)
+        lifts, *slips = self._grips(foot, *forces[foot])
+        speed = slides * self.motion.foot_velocity(foot)[0]
+        stops = Guard(f"{foot} stops sliding", speed + CREEP, decide=partial(_stopped, foot))
+        return [
+            _gated(touches, 1 - stands),
+            _gated(lifts, stands),
+            *(_gated(guard, sticks) for guard in slips),
+            _gated(stops, slides**2),
+        ]
+
+    def _touchdown(self, foot: str) -> Guard:
+        height = self.motion.foot(foot)[1]
+        return Guard(f"{foot} touchdown", height + DEPTH, decide=partial(_landed, foot))
+
+    def _grips(self, foot: str, tangent: sp.Expr, normal: sp.Expr) -> list[Guard]:
+        """Lift-off, and the beginnings of sliding either way."""
         opens = partial(_changed, foot, Contact.OPEN)
         found = [Guard(f"{foot} lift-off", normal + SLACK, decide=opens)]
-        if does is Contact.STICK:
-            grip = self.motion.parameter("friction", self.robot.friction) * normal + SLACK
-            # A ground that pushes back lets the foot slide forward.
-            for way, slack in (
-                (Contact.SLIDE_FORWARD, grip + tangent),
-                (Contact.SLIDE_BACK, grip - tangent),
-            ):
-                slips = partial(_changed, foot, way)
-                found.append(Guard(f"{foot} begins to {way.value}", slack, decide=slips))
-            return found
-        speed = self.motion.foot_velocity(foot)[0]
-        on = speed if does is Contact.SLIDE_FORWARD else -speed
-        return [*found, Guard(f"{foot} stops sliding", on + CREEP, decide=partial(_stopped, foot))]
+        grip = self.motion.parameter("friction", self.robot.friction) * normal + SLACK
+        # A ground that pushes back lets the foot slide forward.
+        for way, slack in (
+            (Contact.SLIDE_FORWARD, grip + tangent),
+            (Contact.SLIDE_BACK, grip - tangent),
+        ):
+            slips = partial(_changed, foot, way)
+            found.append(Guard(f"{foot} begins to {way.value}", slack, decide=slips))
+        return found
 
     def _falls(self) -> list[Guard]:
         return [
             Guard(f"{name} at the ground", self.motion.point(name, link, at)[1], ends=FELL)
             for name, link, at in low_points(self.robot)
         ]
+
+
+def _gated(guard: Guard, flag: sp.Expr) -> Guard:
+    """A guard that can fire where the flag is 1 only."""
+    return replace(guard, expression=flag * guard.expression + (1 - flag))
 
 
 Decided = HybridState | Outcome | None

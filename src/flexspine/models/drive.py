@@ -65,8 +65,14 @@ class Drive:
         """Its parameters."""
         return {}
 
+    @property
+    def usual(self) -> tuple[tuple[str, ...], ...]:
+        """Feet that stand together for long; such footings get a field of their own."""
+        feet = tuple(self.robot.feet)
+        return ((), *((foot,) for foot in feet))
+
     def label(self, moment: Moment) -> str:
-        """What else but the footing the mode depends on, `` by ...``."""
+        """What else but the footing the mode depends on."""
         return ""
 
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+
+import sympy as sp
 
 from flexspine.mechanics.complementarity import Contact
 
 FLIGHT = "flight"
 
 _MARKS = {Contact.STICK: "", Contact.SLIDE_FORWARD: " >", Contact.SLIDE_BACK: " <"}
+
+# Whether a foot stands, and which way it slides.
+_FLAGS = {
+    Contact.OPEN: (0.0, 0.0),
+    Contact.STICK: (1.0, 0.0),
+    Contact.SLIDE_FORWARD: (1.0, 1.0),
+    Contact.SLIDE_BACK: (1.0, -1.0),
+}
+_CONTACTS = {flags: contact for contact, flags in _FLAGS.items()}
+
+
+def flags_of(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
+    """The symbols of a foot's flags."""
+    return sp.Symbol(f"stands_{foot}", real=True), sp.Symbol(f"slides_{foot}", real=True)
 
 
 @dataclass(frozen=True)
@@ -33,15 +49,28 @@ class Footing:
         )
 
     @classmethod
-    def named(cls, name: str) -> Footing:
-        """The footing of a name."""
-        if name == FLIGHT:
-            return cls()
-        parts = []
-        for part in name.split(" + "):
-            foot, _, mark = part.partition(" ")
-            parts.append((foot, next(c for c, m in _MARKS.items() if m.strip() == mark)))
-        return cls(tuple(parts))
+    def sticking_on(cls, feet: Iterable[str]) -> Footing:
+        """The footing of feet that all stick."""
+        return cls(tuple((foot, Contact.STICK) for foot in feet))
+
+    @classmethod
+    def in_flags(cls, held: Mapping[sp.Symbol, float], feet: Iterable[str]) -> Footing:
+        """The footing that flags tell."""
+        found = []
+        for foot in feet:
+            stands, slides = flags_of(foot)
+            if held[stands]:
+                found.append((foot, _CONTACTS[held[stands], held[slides]]))
+        return cls(tuple(found))
+
+    def flags(self, feet: Iterable[str]) -> dict[sp.Symbol, float]:
+        """The flags of all feet."""
+        contacts, found = dict(self.contacts), {}
+        for foot in feet:
+            found |= dict(
+                zip(flags_of(foot), _FLAGS[contacts.get(foot, Contact.OPEN)], strict=True)
+            )
+        return found
 
     @property
     def name(self) -> str:

@@ -1,0 +1,42 @@
+"""Joints that springs and dampers draw to where they are to be, all the time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from flexspine.control.laws import JointSprings
+from flexspine.control.walking import Walker
+from flexspine.hybrid.compile import Array
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.mechanics.linkage_motion import LinkageMotion
+from flexspine.models.articulated import BoundRobot
+from flexspine.models.drive import Turning
+
+STIFFNESS, DAMPING = sp.symbols("joint_stiffness joint_damping", real=True)
+
+
+@dataclass(frozen=True)
+class SpringDriven(Walker):
+    """Walk on joints that give way; the spine bends as forces make it."""
+
+    springs: JointSprings = JointSprings()
+
+    def values(self) -> dict[sp.Symbol, float]:
+        """The springs and dampers, and what the legs measure."""
+        own = {STIFFNESS: self.springs.stiffness, DAMPING: self.springs.damping}
+        return super().values() | own
+
+    def turning(self, motion: LinkageMotion, mode: str) -> Turning:
+        """The torques of the springs and dampers."""
+        torques = {
+            joint: STIFFNESS * (angle - motion.bend(joint))
+            + DAMPING * (rate - motion.bend_rate(joint))
+            for joint, (angle, rate, _) in self.references.joints.items()
+        }
+        return Turning(torques, self.references.definitions, self.reference_angles)
+
+    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+        """The same in numbers."""
+        return self.springs.torques(self.situation(bound.moment(point)))
