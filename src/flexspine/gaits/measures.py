@@ -176,7 +176,7 @@ def _energy(run: Run) -> dict[str, float | None]:
     if not run.trajectory.arcs:
         return {"initial": None, "relative_drift": None}
     interval = max(run.trajectory.duration / 1000, _SHORTEST_INTERVAL)
-    table = sample(run, sample_times(run, interval))
+    table = sample(run, sample_times(run.trajectory, interval))
     balance = table["total_energy"] + table["dissipated_energy"]
     initial = float(balance[0])
     drift = float(np.max(np.abs(balance - initial)))

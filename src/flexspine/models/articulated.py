@@ -234,17 +234,25 @@ class BoundRobot(BoundSystem):
         return found
 
     def _settled(self, moment: Moment, lingering: list[str]) -> Moment:
-        """The moment with more feet on the ground, what is left of their motion taken away."""
-        after = touching(self, moment, dict.fromkeys(lingering, Contact.STICK))
+        """The moment with more feet on the ground, their way up and down taken away."""
+        linkage, contacts = self.linkage, {}
+        for foot in lingering:
+            along = float(linkage.foot_jacobian(moment.q, [foot])[0] @ moment.rates)
+            forward = Contact.SLIDE_FORWARD if along > 0 else Contact.SLIDE_BACK
+            contacts[foot] = Contact.STICK if abs(along) <= CREEP else forward
+        after = touching(self, moment, contacts)
         rows = [
             row
             for foot, does in after.footing.contacts
-            for row in self.linkage.foot_jacobian(moment.q, [foot])[
-                (0 if does is Contact.STICK else 1) :
-            ]
+            for row in linkage.foot_jacobian(moment.q, [foot])[0 if does is Contact.STICK else 1 :]
         ]
-        rates = stopped(self.linkage, moment.q, moment.rates, np.array(rows))
-        return replace(after, rates=rates)
+        rates = stopped(linkage, moment.q, moment.rates, np.array(rows))
+        return replace(after, rates=rates, held=self.lost(after, rates))
+
+    def lost(self, before: Moment, rates: Array) -> dict[sp.Symbol, float]:
+        """What is held when rates have changed at once: the energy that is lost counts."""
+        energies = [self.linkage.kinetic_energy(before.q, each) for each in (before.rates, rates)]
+        return {**before.held, LOSS: before.held[LOSS] + float(energies[0] - energies[1])}
 
     def rise(self, moment: Moment, foot: str) -> float:
         """How fast a foot rises, in m/s."""
@@ -474,13 +482,11 @@ def _after(
     robot: BoundRobot, moment: Moment, feet: list[str], found: Impact, rates: Array
 ) -> Moment:
     """The moment after an impact, before a drive has its say."""
-    linkage, held = robot.linkage, dict(moment.held)
+    held = robot.lost(replace(moment, rates=rates), found.rates)
     for name in robot.robot.feet:
         held |= dict.fromkeys(impulse(name), 0.0)
     for name, push in zip(feet, found.impulses, strict=True):
         held |= dict(zip(impulse(name), push.tolist(), strict=True))
-    energies = [linkage.kinetic_energy(moment.q, each) for each in (rates, found.rates)]
-    held[LOSS] += float(energies[0] - energies[1])
     hit = replace(moment, rates=found.rates, footing=Footing(), held=held)
     stood = moment.footing.sticking
     return touching(robot, hit, dict(zip(feet, found.contacts, strict=True)), stood)

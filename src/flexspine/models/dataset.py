@@ -11,6 +11,7 @@ import numpy as np
 from flexspine._version import __version__
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
+from flexspine.hybrid.trajectory import Trajectory
 from flexspine.models.legs import PHASES, SIDES
 from flexspine.models.simulation import Run
 from flexspine.parameters import values
@@ -66,19 +67,19 @@ VARIABLES: dict[str, tuple[str, str]] = {
 PHASE_CODES = {phase: code for code, phase in enumerate(PHASES)}
 
 
-def sample_times(run: Run, interval: float) -> Array:
-    """Return a regular grid of times over the run, the end included, in s.
+def sample_times(trajectory: Trajectory, interval: float) -> Array:
+    """Return a regular grid of times over a run, the end included, in s.
 
     Raises `ParameterError` for an interval that is not usable.
     """
     check_interval(interval)
-    duration = run.trajectory.duration
+    duration = trajectory.duration
     if duration / interval >= MAX_SAMPLES:
         raise ParameterError(
             f"interval = {interval} s is too short for a run of {duration:.6g} s",
             f"give one that makes fewer than {MAX_SAMPLES} samples",
         )
-    start, end = run.trajectory.start.time, run.trajectory.end.time
+    start, end = trajectory.start.time, trajectory.end.time
     steps = np.arange(int(duration / interval) + 1, dtype=float)
     grid: Array = np.minimum(start + interval * steps, end)  # rounding may overshoot
     return grid if grid[-1] >= end else np.append(grid, end)
@@ -92,9 +93,10 @@ def check_interval(interval: float) -> None:
         )
 
 
-def _checked(run: Run, times: Array) -> Array:
-    """Sorted times, if all of them lie within the run."""
-    start, end = run.trajectory.start.time, run.trajectory.end.time
+def checked_times(trajectory: Trajectory, wanted: Array) -> Array:
+    """Sorted times, if all of them lie within a run. Raises `ParameterError` otherwise."""
+    times = np.asarray(wanted, dtype=float).ravel()
+    start, end = trajectory.start.time, trajectory.end.time
     if not np.all((times >= start) & (times <= end)):
         raise ParameterError(
             f"times reach beyond the run, which lasts from {start:.6g} to {end:.6g} s",
@@ -139,8 +141,8 @@ def to_dataset(
     """
     import xarray as xr
 
-    wanted = None if times is None else _checked(run, np.asarray(times, dtype=float).ravel())
-    grid = sample_times(run, interval) if wanted is None else wanted
+    trajectory = run.trajectory
+    grid = sample_times(trajectory, interval) if times is None else checked_times(trajectory, times)
     columns = sample(run, grid) if run.trajectory.arcs and grid.size else {}
     if not columns:
         grid, columns = grid[:0], {"phase": np.zeros(0)}
