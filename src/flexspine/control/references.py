@@ -60,12 +60,11 @@ class BodyCourse:
 class FootPath:
     """How one foot is to move since ``start``, in SI units.
 
-    From ``x``, ``y`` it goes ``stride`` forward within ``span``, ``lift`` high on its way, so that
+    From ``x`` on the ground it goes ``stride`` forward within ``span``, ``lift`` high on its way, so that
     it comes down at ``landing`` a second; and all the while it sinks by ``sink`` a second.
     """
 
     x: sp.Symbol
-    y: sp.Symbol
     stride: sp.Symbol
     lift: sp.Symbol
     landing: sp.Symbol
@@ -83,7 +82,7 @@ class FootPath:
         since = CLOCK - self.start
         share, turn = since / self.span, 2 * sp.pi / self.span
         x = self.x + self.stride * (share - sp.sin(turn * since) / (2 * sp.pi))
-        y = self.y + self.lift * (1 - sp.cos(turn * since)) / 2 - self.sink * since
+        y = self.lift * (1 - sp.cos(turn * since)) / 2 - self.sink * since
         y += self.landing * self.span * share**2 * (1 - share)
         place = sp.Matrix([x, y])
         return place, place.diff(CLOCK), place.diff(CLOCK, 2)

@@ -120,7 +120,7 @@ class Walk:
         held = {BODY.x: 0.0, BODY.speed: 0.0, BODY.gain: 0.0, BODY.start: 0.0}
         held |= {BODY.height: self.gait.height, STEP: -1.0, SWING_END: NEVER}
         for name, leg in self.legs.items():
-            held |= _stand(name, leg.hip, 0.0)
+            held |= _stand(name, leg.hip)
         return self._next_step(held, 0.0)
 
     def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> dict[sp.Symbol, float]:
@@ -134,8 +134,7 @@ class Walk:
             begun = moment.time - held[path.start]
             if name in swings and held[path.stride] and begun < EARLIEST_LANDING * held[path.span]:
                 continue
-            x, y = (held[symbol] for symbol in anchor(leg.foot))
-            held |= _stand(name, x, y)
+            held |= _stand(name, held[anchor(leg.foot)[0]])
         down = [_stands(name, held) for name in swings]
         return self._next_step(held, moment.time) if all(down) else held
 
@@ -145,7 +144,7 @@ class Walk:
         for name in self.swinging(held):
             if not _stands(name, held):
                 path = FootPath.of(name)
-                new |= _stand(name, held[path.x] + held[path.stride], 0.0)
+                new |= _stand(name, held[path.x] + held[path.stride])
                 new |= {path.sink: self.gait.landing, path.start: time}
         return new | {SWING_END: NEVER}
 
@@ -174,11 +173,11 @@ class Walk:
         return new
 
 
-def _stand(leg: str, x: float, y: float) -> dict[sp.Symbol, float]:
+def _stand(leg: str, x: float) -> dict[sp.Symbol, float]:
     """The path of a foot that stays where it is."""
     path = FootPath.of(leg)
     still = dict.fromkeys((path.stride, path.lift, path.landing, path.sink, path.start), 0.0)
-    return {path.x: x, path.y: y, **still, path.span: 1.0}
+    return {path.x: x, **still, path.span: 1.0}
 
 
 def _stands(leg: str, held: Mapping[sp.Symbol, float]) -> bool:
@@ -302,7 +301,7 @@ class Walker(Drive):
         q = linkage.to_relative @ q
         leg, parts = next(iter(self.walk.legs.items()))
         path = FootPath.of(leg)
-        q[-2:] = np.array([held[path.x], held[path.y]]) - linkage.foot(q, parts.foot)
+        q[-2:] = np.array([held[path.x], 0.0]) - linkage.foot(q, parts.foot)
         return q
 
     def begin(self, bound: BoundRobot) -> HybridState | Outcome:

@@ -44,8 +44,8 @@ BY = " by "
 # that a foot at the edge is found to leave it.
 SLACK = 1e-7
 
-# m; how deep a foot is in the ground when it lands. More than rounding errors, so that a foot that
-# has just left the ground is above this.
+# m; how much a foot has to sink to land. More than rounding errors, so that a foot that has just
+# left the ground is above this.
 DEPTH = 1e-15
 
 # m; feet that would bounce less high stay on the ground. Bounces of several feet in turn grow
@@ -73,9 +73,14 @@ AMBIGUOUS = OutcomeKind(
 )
 
 
-def anchor(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
+def anchor(foot: str) -> tuple[sp.Symbol, sp.Expr]:
     """Where a foot came to rest on the ground."""
-    return sp.Symbol(f"anchor_x_{foot}", real=True), sp.Symbol(f"anchor_y_{foot}", real=True)
+    return sp.Symbol(f"anchor_{foot}", real=True), sp.S.Zero
+
+
+def floor(foot: str) -> sp.Symbol:
+    """The height at which a foot in the air lands: just below the ground, and below the foot."""
+    return sp.Symbol(f"floor_{foot}", real=True)
 
 
 def impulse(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
@@ -171,6 +176,10 @@ class BoundRobot(BoundSystem):
         """The point of a moment; what else flows is that of ``states``."""
         n, to = self.linkage.size, self.linkage.to_absolute
         numbers = moment.held | moment.footing.flags(self.robot.feet)
+        for foot in self.robot.feet:
+            # A foot that stood may have been in the ground by an error of integration.
+            height = float(self.linkage.foot(moment.q, foot)[1])
+            numbers[floor(foot)] = min(height, 0.0) - DEPTH
         held = np.array([numbers[symbol] for symbol in self.system.held])
         new = np.concatenate([states[:n], to @ moment.rates, states[2 * n :]])
         return HybridState(moment.time, self._mode_of(moment), new, held)
@@ -188,7 +197,7 @@ class BoundRobot(BoundSystem):
         low = [foot for foot, (_, y) in places.items() if abs(y) <= GROUND]
         values = dict.fromkeys(self.system.held, 0.0)
         for foot, place in places.items():
-            values |= dict(zip(anchor(foot), place.tolist(), strict=True))
+            values[anchor(foot)[0]] = float(place[0])
         footing = Footing.of(dict.fromkeys(low, Contact.STICK), self.robot.feet)
         return Moment(0.0, q, rates, footing, {**values, **held})
 
@@ -267,7 +276,7 @@ def articulated_system(build: Build) -> HybridSystem:
     held = [
         symbol
         for foot in robot.feet
-        for symbol in (*flags_of(foot), *anchor(foot), *impulse(foot))
+        for symbol in (*flags_of(foot), anchor(foot)[0], floor(foot), *impulse(foot))
     ]
     built: dict[str, Mode] = {}
 
@@ -396,7 +405,7 @@ class _Footed:
 
     def _touchdown(self, foot: str) -> Guard:
         height = self.motion.foot(foot)[1]
-        return Guard(f"{foot} touchdown", height + DEPTH, decide=partial(_landed, foot))
+        return Guard(f"{foot} touchdown", height - floor(foot), decide=partial(_landed, foot))
 
     def _grips(self, foot: str, tangent: sp.Expr, normal: sp.Expr) -> list[Guard]:
         """Lift-off, and the beginnings of sliding either way."""
@@ -440,7 +449,8 @@ def _landed(foot: str, bound: BoundSystem, point: HybridState) -> Decided:
     for other in robot.robot.feet:
         if moment.footing.does(other) is Contact.OPEN and other != foot:
             rise = robot.rise(moment, other)
-            if rise < 0 and linkage.foot(moment.q, other)[1] <= DEPTH - rise * TOGETHER:
+            above = linkage.foot(moment.q, other)[1] - moment.held[floor(other)]
+            if rise < 0 and above <= -rise * TOGETHER:
                 down[other] = rise
     touching = [each for each in robot.robot.feet if each in {*down, *moment.footing.feet}]
     return _hit(robot, moment, point.states, touching, moment.rates, tuple(down))
@@ -502,8 +512,7 @@ def touching(
     held = dict(moment.held)
     for name in contacts:
         if name not in stood:
-            place = robot.linkage.foot(moment.q, name).tolist()
-            held |= dict(zip(anchor(name), place, strict=True))
+            held[anchor(name)[0]] = float(robot.linkage.foot(moment.q, name)[0])
     footing = Footing.of({**dict(moment.footing.contacts), **contacts}, robot.robot.feet)
     return replace(moment, footing=footing, held=held)
 
