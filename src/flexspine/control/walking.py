@@ -38,9 +38,6 @@ from flexspine.models.robot import Robot
 
 STEP, SWING_END = sp.symbols("step swing_end", real=True)
 
-# Of the swing; feet that touch the ground before have not been put down but stumbled.
-EARLIEST_LANDING = 0.5
-
 # Of the stretched leg; beyond this angles change without bounds.
 LONGEST = 0.999
 
@@ -124,29 +121,39 @@ class Walk:
         return self._next_step(held, 0.0)
 
     def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> dict[sp.Symbol, float]:
-        """Keep feet where they landed; if all that swung have, let the others swing."""
-        held = dict(moment.held)
+        """Keep feet where they landed. They are pressed on, or they would bounce."""
+        held, time = dict(moment.held), moment.time
         swings = self.swinging(held)
-        for name, leg in self.legs.items():
-            if leg.foot not in landed or leg.foot not in moment.footing.feet:
-                continue
-            path = FootPath.of(name)
-            begun = moment.time - held[path.start]
-            if name in swings and held[path.stride] and begun < EARLIEST_LANDING * held[path.span]:
-                continue
-            held |= _stand(name, held[anchor(leg.foot)[0]])
-        down = [_stands(name, held) for name in swings]
-        return self._next_step(held, moment.time) if all(down) else held
+        for name in swings:
+            foot, path = self.legs[name].foot, FootPath.of(name)
+            early = held[path.stride] and time - held[path.start] < held[path.span] / 2
+            if foot in landed and not early:
+                held |= self._sink(name, held[anchor(foot)[0]], time)
+        return held
+
+    def after_settling(self, moment: Moment) -> dict[sp.Symbol, float] | None:
+        """Change pairs if all feet that swung are on the ground."""
+        held, swings = dict(moment.held), self.swinging(moment.held)
+        feet = moment.footing.feet
+        if not all(_sinks(name, held) and self.legs[name].foot in feet for name in swings):
+            return None
+        for name in swings:
+            held |= _stand(name, held[anchor(self.legs[name].foot)[0]])
+        return self._next_step(held, moment.time)
 
     def swing_over(self, held: Mapping[sp.Symbol, float], time: float) -> dict[sp.Symbol, float]:
         """Let feet that ought to have landed sink until they do."""
         new = dict(held)
         for name in self.swinging(held):
-            if not _stands(name, held):
+            if not _sinks(name, held):
                 path = FootPath.of(name)
-                new |= _stand(name, held[path.x] + held[path.stride])
-                new |= {path.sink: self.gait.landing, path.start: time}
+                new |= self._sink(name, held[path.x] + held[path.stride], time)
         return new | {SWING_END: NEVER}
+
+    def _sink(self, leg: str, x: float, time: float) -> dict[sp.Symbol, float]:
+        """The path of a foot that comes straight down."""
+        path = FootPath.of(leg)
+        return _stand(leg, x) | {path.sink: self.gait.landing, path.start: time}
 
     def _next_step(self, held: dict[sp.Symbol, float], time: float) -> dict[sp.Symbol, float]:
         """Change pairs."""
@@ -180,10 +187,9 @@ def _stand(leg: str, x: float) -> dict[sp.Symbol, float]:
     return {path.x: x, **still, path.span: 1.0}
 
 
-def _stands(leg: str, held: Mapping[sp.Symbol, float]) -> bool:
-    """Whether a foot is to stay where it is."""
-    path = FootPath.of(leg)
-    return held[path.lift] == 0 and held[path.sink] == 0
+def _sinks(leg: str, held: Mapping[sp.Symbol, float]) -> bool:
+    """Whether a foot is to come straight down."""
+    return held[FootPath.of(leg).sink] != 0
 
 
 @dataclass(frozen=True)
@@ -284,9 +290,14 @@ class Walker(Drive):
             found.append(Guard(f"{name} out of reach", slack, ends=OUT_OF_REACH))
         return tuple(found)
 
-    def after_impact(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
-        """Change pairs if it is time to."""
+    def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
+        """Keep feet where they landed."""
         return replace(moment, held=self.walk.after_landing(moment, landed))
+
+    def after_settling(self, moment: Moment) -> Moment:
+        """Change pairs if it is time to."""
+        held = self.walk.after_settling(moment)
+        return moment if held is None else replace(moment, held=held)
 
     def counted(self, moment: Moment) -> tuple[str, ...]:
         """The feet that are to stand. A foot that bounces or slides for a moment still counts."""

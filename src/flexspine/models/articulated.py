@@ -222,10 +222,12 @@ class BoundRobot(BoundSystem):
             contacts = dict(zip(feet, found.contacts, strict=True))
             after = replace(moment, footing=Footing.of(contacts, self.robot.feet))
             lingering = self._lingering(after, accelerations)
-            if not lingering:
-                moment = after
+            if lingering:
+                moment = self._settled(after, lingering)
+                continue
+            moment = self.drive.after_settling(after)
+            if moment is after:
                 break
-            moment = self._settled(after, lingering)
         return self.point(moment, states)
 
     def _lingering(self, moment: Moment, accelerations: Array) -> list[str]:
@@ -485,7 +487,7 @@ def _hit(
         text = f"{found.solutions} at the impact of {', '.join(feet)} at t = {moment.time:.9g} s"
         return Outcome(kind, text)
     after = _after(robot, moment, feet, found, rates)
-    return robot.carry_on(robot.drive.after_impact(after, landed), states)
+    return robot.carry_on(robot.drive.after_landing(after, landed), states)
 
 
 def _after(

@@ -87,6 +87,10 @@ class Drive:
         """When it changes its mind, or gives up."""
         return ()
 
-    def after_impact(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
+    def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
         """What it makes of an impact at which feet landed."""
+        return moment
+
+    def after_settling(self, moment: Moment) -> Moment:
+        """What it makes of the footing that comes of a change; the same moment if nothing."""
         return moment
