@@ -25,15 +25,17 @@ SMALL = 1e-8
 class Situation:
     """A robot at one instant, and what is wanted of it.
 
-    ``feet`` are those that are to stand and do. ``joints`` (3, m) are angle, rate and acceleration
-    that are wanted of the motors' joints, ``links`` those of the swinging legs' links, ``com`` (3, 2)
-    place, velocity and acceleration of the centre of mass. ``limit`` bounds torques, in N m.
+    ``feet`` are those that are to stand; ``regular`` if they do, none slides and no other foot
+    touches the ground. ``joints`` (3, m) are angle, rate and acceleration that are wanted of the
+    motors' joints, ``links`` those of the swinging legs' links, ``com`` (3, 2) place, velocity and
+    acceleration of the centre of mass. ``limit`` bounds torques, in N m.
     """
 
     linkage: Linkage
     q: Array
     rates: Array
     feet: tuple[str, ...]
+    regular: bool
     joints: Array
     links: Mapping[str, Array]
     com: Array
@@ -56,6 +58,7 @@ class Law(ABC):
 class Tracking(Law):
     """Computed torque: ``e'' + K_d e' + K_p e = 0`` for every motor's joint.
 
+    While feet slide or bounce that is not to be had, and `LeastResidual` takes over.
     ``stiffness`` in 1/s^2, ``damping`` in 1/s.
     """
 
@@ -72,6 +75,8 @@ class Tracking(Law):
 
     def torques(self, now: Situation) -> Array:
         """The torques (m,)."""
+        if not now.regular:
+            return LeastResidual(self.stiffness, self.damping).torques(now)
         return tracked(now.linkage, now.q, now.rates, now.feet, self.wanted(now)).torques
 
 
