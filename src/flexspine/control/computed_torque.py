@@ -8,7 +8,7 @@ and torques, but not the motion.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import sympy as sp
@@ -49,7 +49,7 @@ class Gains:
 class ComputedTorque(Walker):
     """Walk with joints that follow their references without delay."""
 
-    gains: Gains = Gains()
+    gains: Gains = field(default_factory=Gains)
 
     def values(self) -> dict[sp.Symbol, float]:
         """The gains, and what the legs measure."""

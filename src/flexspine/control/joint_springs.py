@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -21,7 +21,7 @@ STIFFNESS, DAMPING = sp.symbols("joint_stiffness joint_damping", real=True)
 class SpringDriven(Walker):
     """Walk on joints that give way; the spine bends as forces make it."""
 
-    springs: JointSprings = JointSprings()
+    springs: JointSprings = field(default_factory=JointSprings)
 
     def values(self) -> dict[sp.Symbol, float]:
         """The springs and dampers, and what the legs measure."""

@@ -70,8 +70,10 @@ class Tracking(Law):
         """The accelerations of the joints, shape (m,)."""
         motors = now.linkage.actuation.T
         angle, rate, acceleration = now.joints
-        back: Array = self.stiffness * (angle - motors @ now.q)
-        return acceleration + back + self.damping * (rate - motors @ now.rates)
+        back = self.stiffness * (angle - motors @ now.q)
+        back += self.damping * (rate - motors @ now.rates)
+        wanted: Array = acceleration + back
+        return wanted
 
     def torques(self, now: Situation) -> Array:
         """The torques (m,)."""
@@ -211,5 +213,6 @@ class JointSprings(Law):
         """The torques (m,)."""
         motors = now.linkage.actuation.T
         angle, rate, _ = now.joints
-        back: Array = self.stiffness * (angle - motors @ now.q)
-        return back + self.damping * (rate - motors @ now.rates)
+        pull: Array = self.stiffness * (angle - motors @ now.q)
+        pull += self.damping * (rate - motors @ now.rates)
+        return pull

@@ -22,7 +22,6 @@ from flexspine.models.articulated import CLOCK
 from flexspine.models.leg_geometry import Leg
 from flexspine.models.robot import Robot
 
-
 # Angle, rate and acceleration.
 Motion = tuple[sp.Expr, sp.Expr, sp.Expr]
 
@@ -40,11 +39,11 @@ class BodyCourse:
     SI units; the height of the hips, and what is gained in speed a second.
     """
 
-    x: sp.Symbol = _symbol("body_x")
-    speed: sp.Symbol = _symbol("body_speed")
-    gain: sp.Symbol = _symbol("body_gain")
-    start: sp.Symbol = _symbol("body_start")
-    height: sp.Symbol = _symbol("body_height")
+    x: sp.Symbol
+    speed: sp.Symbol
+    gain: sp.Symbol
+    start: sp.Symbol
+    height: sp.Symbol
 
     def motion(self) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         """Place, speed and acceleration along x."""
@@ -60,8 +59,8 @@ class BodyCourse:
 class FootPath:
     """How one foot is to move since ``start``, in SI units.
 
-    From ``x`` on the ground it goes ``stride`` forward within ``span``, ``lift`` high on its way, so that
-    it comes down at ``landing`` a second; and all the while it sinks by ``sink`` a second.
+    From ``x`` on the ground it goes ``stride`` forward within ``span``, ``lift`` high on its way,
+    so that it comes down at ``landing`` a second; and all the while it sinks by ``sink`` a second.
     """
 
     x: sp.Symbol
@@ -88,7 +87,7 @@ class FootPath:
         return place, place.diff(CLOCK), place.diff(CLOCK, 2)
 
 
-BODY = BodyCourse()
+BODY = BodyCourse(*(_symbol(f"body_{each.name}") for each in fields(BodyCourse)))
 
 
 def leg_number(kind: str, leg: str) -> sp.Symbol:
@@ -138,7 +137,9 @@ def references(robot: Robot, legs: Mapping[str, Leg]) -> References:
         hips = [sp.Matrix([body[0] + leg_number("hip", name), BODY.height])]
         hips += [sp.Matrix([each, 0]) for each in body[1:]]
         reach = [
-            sp.Matrix([define(f"reach_{axis}{order}_{name}", part[i]) for i, axis in enumerate("xy")])
+            sp.Matrix(
+                [define(f"reach_{axis}{order}_{name}", part[i]) for i, axis in enumerate("xy")]
+            )
             for order, part in enumerate(f - h for f, h in zip(foot, hips, strict=True))
         ]
         lengths = leg_number("thigh", name), leg_number("shank", name)

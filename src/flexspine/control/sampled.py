@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,7 +35,7 @@ OUT_OF_CONTROL = OutcomeKind(
 class Sampled(Walker):
     """Walk by a law that is asked ``rate`` times a second; ``limit`` bounds torques, in N m."""
 
-    law: Law = Tracking()
+    law: Law = field(default_factory=Tracking)
     rate: float = 400.0
     limit: float = np.inf
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from math import inf
-from typing import Any
 
 from flexspine.control.computed_torque import ComputedTorque, Gains
 from flexspine.control.joint_springs import SpringDriven
@@ -44,7 +43,7 @@ class Trot:
 
     seconds: float = 20.0
     controller: str = "tracking"
-    gait: Gait = Gait()
+    gait: Gait = field(default_factory=Gait)
     rate: float | None = None
     limit: float | None = None
     stiffness: float | None = None
@@ -148,4 +147,3 @@ def _push(robot: Robot, asked: Trot) -> Push | None:
     trunk = next(leg.trunk for leg in robot.legs.values())
     time = asked.seconds / 2 if asked.push_time is None else asked.push_time
     return Push(time, (asked.push, 0.0), trunk)
-

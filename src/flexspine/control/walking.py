@@ -8,7 +8,7 @@ distance between them from adding up. Speed is changed evenly over the first ste
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
@@ -196,7 +196,7 @@ def _sinks(leg: str, held: Mapping[sp.Symbol, float]) -> bool:
 class Walker(Drive):
     """A drive that walks; how torques follow from what joints are to do is left to its kinds."""
 
-    gait: Gait = Gait()
+    gait: Gait = field(default_factory=Gait)
 
     @cached_property
     def walk(self) -> Walk:

@@ -303,8 +303,9 @@ class BoundMode:
 
 
 def evaluate_columns(function: Any, states: Array, parameters: Array) -> Array:
-    """Evaluate a compiled function at states of shape (k, n) with the same parameters."""
-    spread = np.repeat(parameters[: function.nparams, None], len(states), axis=1)
+    """Evaluate a compiled function at states of shape (k, n); parameters (p,) or (k, p)."""
+    needed = np.broadcast_to(parameters, (len(states), parameters.shape[-1]))
+    spread = np.ascontiguousarray(needed[:, : function.nparams].T)
     result: Array = function(np.ascontiguousarray(states.T), pars=spread)
     return result
 
@@ -331,7 +332,11 @@ class BoundSystem:
         return bound
 
     def observe(self, mode: str, states: Array, held: Array) -> dict[str, Array]:
-        """Evaluate the observables of a mode at states of shape (k, n), each shape (k,)."""
+        """Evaluate the observables of a mode at states of shape (k, n), each shape (k,).
+
+        ``held`` has shape (m,), or (k, m) if it differs between the states.
+        """
         names, function = self.compiled.observables(mode)
-        parameters = np.concatenate([held, self.parameters])
-        return dict(zip(names, evaluate_columns(function, states, parameters), strict=True))
+        parameters = np.broadcast_to(self.parameters, (*held.shape[:-1], self.parameters.size))
+        inputs = np.concatenate([held, parameters], axis=-1)
+        return dict(zip(names, evaluate_columns(function, states, inputs), strict=True))

@@ -102,7 +102,8 @@ class Linkage:
     @cached_property
     def to_relative(self) -> Array:
         """``q`` from absolute angles and the base, shape (N, N)."""
-        return np.rint(np.linalg.inv(self.to_absolute))
+        turned: Array = np.rint(np.linalg.inv(self.to_absolute))
+        return turned
 
     def arms(self, link: str, distance: float) -> Array:
         """The lever arms of a point on a link, at a distance from its start, shape (n,)."""
@@ -200,14 +201,15 @@ class Linkage:
     def potential_forces(self, q: Array) -> Array:
         """``G``, the gradient of the potential energy, springs included, shape (..., N)."""
         stiffness, rests, _ = self._springs
-        forces = stiffness * (q - rests)
+        forces: Array = stiffness * (q - rests)
         forces[..., :-2] += self.gravity * self.moments * np.cos(self.angles(q)) @ self._chains
         forces[..., -1] += self.gravity * self.mass
         return forces
 
     def damping_forces(self, rates: Array) -> Array:
         """What the dampers of the joints take up, ``c q'``, shape (..., N)."""
-        return self._springs[2] * rates
+        forces: Array = self._springs[2] * rates
+        return forces
 
     @cached_property
     def _springs(self) -> Array:

@@ -250,19 +250,6 @@ class LinkageMotion:
             -2 * SETTLING * y_rate - SETTLING**2 * off[1],
         )
 
-    def _forces_on(self, feet: Sequence[Standing], sizes: Sequence[sp.Expr]) -> dict[str, Point]:
-        """The forces on feet from the sizes of their pushes."""
-        forces: dict[str, Point] = {}
-        rest = list(sizes)
-        for foot in feet:
-            if foot.slides is None:
-                forces[foot.name], rest = (rest[0], rest[1]), rest[2:]
-            else:
-                way = -1 if foot.slides else 1
-                forces[foot.name] = way * self.parameter("friction", self.friction) * rest[0], rest[0]
-                rest = rest[1:]
-        return forces
-
     def _base(self, names: str) -> tuple[sp.Symbol, ...]:
         return tuple(_symbol(name) for name in names.split())
 

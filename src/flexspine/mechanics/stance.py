@@ -14,7 +14,6 @@ import numpy as np
 from flexspine.mechanics.complementarity import Contact, Resolution, resolve
 from flexspine.mechanics.linkage import Array, Linkage
 
-
 TOO_MUCH = "the feet hold what the motors are to move"
 
 # Relative; what is left of equations that cannot be solved is of order one.

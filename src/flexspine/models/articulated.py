@@ -175,7 +175,7 @@ class BoundRobot(BoundSystem):
     def point(self, moment: Moment, states: Array) -> HybridState:
         """The point of a moment; what else flows is that of ``states``."""
         n, to = self.linkage.size, self.linkage.to_absolute
-        numbers = moment.held | moment.footing.flags(self.robot.feet)
+        numbers = {**moment.held, **moment.footing.flags(self.robot.feet)}
         for foot in self.robot.feet:
             # A foot that stood may have been in the ground by an error of integration.
             height = float(self.linkage.foot(moment.q, foot)[1])

@@ -65,7 +65,8 @@ class Footing:
 
     def flags(self, feet: Iterable[str]) -> dict[sp.Symbol, float]:
         """The flags of all feet."""
-        contacts, found = dict(self.contacts), {}
+        contacts = dict(self.contacts)
+        found: dict[sp.Symbol, float] = {}
         for foot in feet:
             found |= dict(
                 zip(flags_of(foot), _FLAGS[contacts.get(foot, Contact.OPEN)], strict=True)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from flexspine.errors import ParameterError
-from flexspine.mechanics.linkage import Array, Linkage
 from flexspine.models.robot import LegParts, Robot
 
 # m; as far as the ends of links may miss each other.
@@ -113,11 +111,3 @@ def _leg(robot: Robot, name: str, parts: LegParts, hip: float) -> Leg:
         upwards=upwards,
         knee_back=parts.knee_back,
     )
-
-
-def straight(linkage: Linkage, legs: Mapping[str, Leg], angles: Mapping[str, Array]) -> Array:
-    """Absolute angles of all links: those given by leg, thigh and shank, and a level trunk."""
-    found = np.zeros(len(linkage.links))
-    for name, leg in legs.items():
-        found[linkage.place[leg.thigh]], found[linkage.place[leg.shank]] = angles[name]
-    return found

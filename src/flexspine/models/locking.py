@@ -16,7 +16,10 @@ def locked(robot: Robot, joint: str) -> Robot:
     parent = robot.parents[child]
     assert parent is not None
     numbers = dict(robot.numbers)
-    one, other = ({k: numbers[f"{n}.{k}"] for k in LinkNumbers.model_fields} for n in (parent, child))
+    one, other = (
+        {each: numbers[f"{link}.{each}"] for each in LinkNumbers.model_fields}
+        for link in (parent, child)
+    )
     beyond = other["at"]
     mass = one["mass"] + other["mass"]
     com = (one["mass"] * one["com"] + other["mass"] * (beyond + other["com"])) / mass

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
 
 from flexspine._version import __version__
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome
-from flexspine.hybrid.trajectory import Arc, Event, Trajectory
-from flexspine.models.articulated import LOSS, BoundRobot, impulse
+from flexspine.hybrid.trajectory import Event, Trajectory
+from flexspine.models.articulated import DISSIPATED, LOSS, WORK, BoundRobot, impulse
 from flexspine.models.dataset import DEFAULT_INTERVAL, checked_times, sample_times
-from flexspine.models.footing import Footing
+from flexspine.models.footing import Footing, flags_of
 from flexspine.models.robot import Robot
 
 if TYPE_CHECKING:
@@ -102,8 +105,7 @@ def robot_dataset(
 
     trajectory = run.trajectory
     grid = sample_times(trajectory, interval) if times is None else checked_times(trajectory, times)
-    parts = [_sample(run, arc, grid[part]) for arc, part in trajectory.pieces(grid)]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    columns = _sample(run, grid)
     footings = columns.pop("footing")
     events, robot = run.events, run.robot
     hits = np.array([run.impulses(event) for event in events]).reshape(-1, len(robot.feet), 2)
@@ -135,18 +137,23 @@ def _about(name: str) -> dict[str, str]:
     return {"units": unit, "long_name": text}
 
 
-def _sample(run: RobotRun, arc: Arc, times: Array) -> dict[str, Any]:
-    """Every quantity at times within one arc."""
+def _sample(run: RobotRun, times: Array) -> dict[str, Any]:
+    """Every quantity at sorted times."""
     bound, robot, linkage = run.bound, run.robot, run.robot.linkage
-    n, count = linkage.size, len(times)
-    states = arc(times)
+    n, count, system = linkage.size, len(times), run.bound.system
+    states = np.zeros((count, len(system.states)))
+    held = np.zeros((count, len(system.held)))
+    modes = np.zeros(count, dtype=object)
+    for arc, part in run.trajectory.pieces(times):
+        states[part], held[part], modes[part] = arc(times[part]), arc.held, arc.mode
+    seen = _observed(bound, modes, states, held)
+    flags = {foot: [held[:, system.places[f]] for f in flags_of(foot)] for foot in robot.feet}
     q, rates = states[:, :n] @ linkage.to_relative.T, states[:, n : 2 * n] @ linkage.to_relative.T
-    seen = bound.observe(arc.mode, states, arc.held)
-    held = dict(zip(bound.system.held, arc.held.tolist(), strict=True))
-    footing = Footing.in_flags(held, robot.feet)
-    flags = np.array(list(footing.flags(robot.feet).values())).reshape(-1, 2)
     places = [linkage.place[joint] for joint in robot.joints]
     motors = [name for name, (_, motor) in robot.joints.items() if motor]
+    starts = [linkage.point(q, link.name, 0.0) for link in linkage.links]
+    ends = [linkage.point(q, link.name, link.length) for link in linkage.links]
+    forces = [_table(seen, f"force_{axis}", robot.feet, count) for axis in "xy"]
     found: dict[str, Any] = {
         "com": linkage.com(q),
         "com_rate": (linkage.com_jacobian(q) @ rates[..., None])[..., 0],
@@ -154,18 +161,18 @@ def _sample(run: RobotRun, arc: Arc, times: Array) -> dict[str, Any]:
         "angle_rate": rates[:, places],
         "torque": _table(seen, "torque", motors, count),
         "link_angle": linkage.angles(q),
-        "link_start": np.stack([linkage.point(q, l.name, 0.0) for l in linkage.links], axis=1),
-        "link_end": np.stack([linkage.point(q, l.name, l.length) for l in linkage.links], axis=1),
+        "link_start": np.stack(starts, axis=1),
+        "link_end": np.stack(ends, axis=1),
         "foot": np.stack([linkage.foot(q, foot) for foot in robot.feet], axis=1),
-        "grf": np.stack([_table(seen, f"force_{axis}", robot.feet, count) for axis in "xy"], axis=2),
-        "stands": np.tile(flags[:, 0], (count, 1)),
-        "slides": np.tile(flags[:, 1], (count, 1)),
+        "grf": np.stack(forces, axis=2),
+        "stands": np.stack([stands for stands, _ in flags.values()], axis=1),
+        "slides": np.stack([slides for _, slides in flags.values()], axis=1),
         "kinetic_energy": linkage.kinetic_energy(q, rates),
         "potential_energy": linkage.potential_energy(q),
-        "motor_work": states[:, 2 * n + 1],
-        "dissipated_energy": states[:, 2 * n + 2],
-        "impact_loss": np.full(count, held[LOSS]),
-        "footing": np.full(count, footing.name, dtype=object),
+        "motor_work": states[:, system.places[WORK]],
+        "dissipated_energy": states[:, system.places[DISSIPATED]],
+        "impact_loss": held[:, system.places[LOSS]],
+        "footing": np.array([_footing_name(row) for row in _rows(flags)], dtype=object),
     }
     if any(name.startswith("reference_") for name in seen):
         found["reference"] = _table(seen, "reference", motors, count)
@@ -176,7 +183,36 @@ def _sample(run: RobotRun, arc: Arc, times: Array) -> dict[str, Any]:
     return found
 
 
-def _table(seen: dict[str, Array], kind: str, names: Any, count: int) -> Array:
+def _observed(
+    bound: BoundRobot, modes: NDArray[np.object_], states: Array, held: Array
+) -> dict[str, Array]:
+    """What the modes observe, each over all times."""
+    seen: dict[str, Array] = {}
+    for mode in sorted(set(modes)):
+        here = modes == mode
+        for name, values in bound.observe(mode, states[here], held[here]).items():
+            seen.setdefault(name, np.zeros(len(modes)))[here] = values
+    return seen
+
+
+def _rows(flags: dict[str, list[Array]]) -> Iterator[tuple[tuple[str, float, float], ...]]:
+    """Foot, whether it stands and how it slides, of all feet at each time."""
+    columns = [
+        [(foot, *pair) for pair in zip(stands.tolist(), slides.tolist(), strict=True)]
+        for foot, (stands, slides) in flags.items()
+    ]
+    return zip(*columns, strict=True)
+
+
+@lru_cache(maxsize=1024)
+def _footing_name(row: tuple[tuple[str, float, float], ...]) -> str:
+    held: dict[sp.Symbol, float] = {}
+    for foot, *pair in row:
+        held |= dict(zip(flags_of(foot), pair, strict=True))
+    return Footing.in_flags(held, [foot for foot, *_ in row]).name
+
+
+def _table(seen: dict[str, Array], kind: str, names: Iterable[str], count: int) -> Array:
     """Observables of a kind, shape (times, names); those that are not observed are zero."""
     columns = [seen.get(f"{kind}_{name}", np.zeros(count)) for name in names]
     return np.array(columns).reshape(len(columns), count).T
