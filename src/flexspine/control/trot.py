@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from math import inf
 
@@ -53,17 +54,27 @@ class Trot:
 
 
 def trot(
-    robot: Robot, wanted: Trot | None = None, *, tolerance: float = DEFAULT_TOLERANCE
+    robot: Robot,
+    wanted: Trot | None = None,
+    *,
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[float], None] | None = None,
 ) -> RobotRun:
     """Let a robot trot from standing.
 
-    A run that falls is no error: look at ``outcome``. Raises `ParameterError` and
+    A run that falls is no error: look at ``outcome``. ``progress`` is told the share that is done,
+    0 to 1. Raises `ParameterError` and
     `UnknownNameError` for what cannot be asked for, and for a robot that has no legs to trot on.
     """
     asked = Trot() if wanted is None else wanted
     drive = driven(robot, asked)
     push = _push(robot, asked)
-    bound = BoundRobot(drive, check_between("tolerance", tolerance, *TOLERANCES), push=push)
+    bound = BoundRobot(
+        drive,
+        check_between("tolerance", tolerance, *TOLERANCES),
+        push=push,
+        watch=None if progress is None else lambda time: progress(time / asked.seconds),
+    )
     start = drive.begin(bound)
     settings = {
         "controller": asked.controller,

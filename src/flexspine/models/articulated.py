@@ -13,7 +13,7 @@ others, most of them over within milliseconds, share one in which flags tell wha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 
@@ -149,18 +149,25 @@ def low_points(robot: Robot) -> list[tuple[str, str, float]]:
 class BoundRobot(BoundSystem):
     """A driven robot's compiled system with its numbers.
 
-    ``slides`` False: feet that touch at an impact stick or let go.
+    ``slides`` False: feet that touch at an impact stick or let go. ``watch`` is told the time (s)
+    whenever something happens.
     """
 
     def __init__(
-        self, drive: Drive, tolerance: float, *, push: Push | None = None, slides: bool = True
+        self,
+        drive: Drive,
+        tolerance: float,
+        *,
+        push: Push | None = None,
+        slides: bool = True,
+        watch: Callable[[float], None] | None = None,
     ) -> None:
         system = articulated_system(Build.like(drive))
         own = complete_motion(drive.robot).values | drive.values()
         own[PUSH_TIME] = -1.0 if push is None else push.time
         numbers = np.array([own[symbol] for symbol in system.parameters])
         super().__init__(compile_system(system, tolerance), numbers)
-        self.drive, self.push, self.slides = drive, push, slides
+        self.drive, self.push, self.slides, self.watch = drive, push, slides, watch
         self.robot, self.linkage = drive.robot, drive.robot.linkage
 
     def moment(self, point: HybridState) -> Moment:
@@ -208,6 +215,8 @@ class BoundRobot(BoundSystem):
 
     def carry_on(self, moment: Moment, states: Array) -> HybridState | Outcome:
         """Go on after something jumped: find out what each touching foot does next."""
+        if self.watch is not None:
+            self.watch(moment.time)
         while moment.footing.feet:
             feet = moment.footing.feet
             torques = self.drive.torques_at(self, self.point(moment, states))
