@@ -23,6 +23,7 @@ from flexspine.cli import (
     presets,
     study,
     sweep,
+    trot,
 )
 from flexspine.cli.output import fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
@@ -56,6 +57,7 @@ app.command("sweep")(sweep.sweep)
 app.command("rerun")(sweep.rerun)
 app.command("basin")(basin.basin)
 app.command("map")(gait_map.gait_map)
+app.command("trot")(trot.trot)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
 app.add_typer(cache.app, name="cache")

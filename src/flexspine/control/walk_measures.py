@@ -107,7 +107,9 @@ def _plan(run: RobotRun, times: Array) -> tuple[Array, Array, Array]:
     where = [places[anchor(foot)[0]] for foot in feet]
     for arc, part in run.trajectory.pieces(times):
         step[part] = arc.held[places[STEP]]
-        standing = {walker.walk.legs[leg].foot for leg in walker.walk.standing({STEP: step[part][0]})}
+        standing = {
+            walker.walk.legs[leg].foot for leg in walker.walk.standing({STEP: step[part][0]})
+        }
         planned[part] = [foot in standing for foot in feet]
         anchors[part] = arc.held[where]
     return planned, anchors, step

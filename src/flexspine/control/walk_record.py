@@ -12,7 +12,7 @@ from flexspine.models.robot_run import RobotRun
 
 
 def walk_record(run: RobotRun, summary: WalkSummary) -> dict[str, Any]:
-    """Return the run's outcome, settings and measures, in SI units; None where there is no value."""
+    """Return outcome, settings and measures, in SI units; None where there is no value."""
     return {
         "schema_version": SCHEMA_VERSION,
         "robot": run.robot.name,
@@ -22,7 +22,8 @@ def walk_record(run: RobotRun, summary: WalkSummary) -> dict[str, Any]:
         "duration": run.trajectory.duration,
         "settings": {key: _plain(value) for key, value in run.settings.items()},
         "spine": {
-            name: run.robot.numbers.get(f"spine.{name}") for name in ("stiffness", "damping", "rest")
+            name: run.robot.numbers.get(f"spine.{name}")
+            for name in ("stiffness", "damping", "rest")
         },
         "measures": {key: _plain(value) for key, value in asdict(summary).items()},
         "tolerance": run.tolerance,

@@ -495,15 +495,13 @@ def _hit(
         kind = NO_SOLUTION if found.verdict is Verdict.NONE else AMBIGUOUS
         text = f"{found.solutions} at the impact of {', '.join(feet)} at t = {moment.time:.9g} s"
         return Outcome(kind, text)
-    after = _after(robot, moment, feet, found, rates)
+    after = _after(robot, moment, feet, found)
     return robot.carry_on(robot.drive.after_landing(after, landed), states)
 
 
-def _after(
-    robot: BoundRobot, moment: Moment, feet: list[str], found: Impact, rates: Array
-) -> Moment:
+def _after(robot: BoundRobot, moment: Moment, feet: list[str], found: Impact) -> Moment:
     """The moment after an impact, before a drive has its say."""
-    held = robot.lost(replace(moment, rates=rates), found.rates)
+    held = robot.lost(moment, found.rates)
     for name in robot.robot.feet:
         held |= dict.fromkeys(impulse(name), 0.0)
     for name, push in zip(feet, found.impulses, strict=True):

@@ -50,7 +50,7 @@ ROBOT_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "potential_energy": (("time",), "J", "of weight, zero at height zero, and of springs"),
     "motor_work": (("time",), "J", "work of the motors since the start"),
     "dissipated_energy": (("time",), "J", "energy lost in dampers and by sliding"),
-    "impact_loss": (("time",), "J", "kinetic energy lost at impacts"),
+    "impact_loss": (("time",), "J", "kinetic energy lost at impacts, less what a push added"),
     "total_energy": (("time",), "J", "kinetic and potential energy"),
 }
 
