@@ -20,7 +20,7 @@ from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion, Standing
-from flexspine.mechanics.linkage_tracking import TrackedMotion, follow
+from flexspine.mechanics.linkage_tracking import follow
 from flexspine.models.articulated import BY, BoundRobot, anchor, stands_in
 from flexspine.models.drive import Moment, Turning
 from flexspine.models.footing import Footing
@@ -64,24 +64,21 @@ class ComputedTorque(Walker):
 
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         """The torques, and the motion where the law knows it."""
-        found = self._law(motion, mode)
-        known = BY not in mode
+        counted = stands_in(self, mode.partition(BY)[2] or mode)
+        assert counted is not None
+        wanted = wanted_accelerations(self.references, motion)
+        found = follow(motion, [Standing(foot, anchor(foot)) for foot in counted], wanted)
+        known, guards = BY not in mode, []
+        if found.closeness is not None:
+            apart = found.closeness**2 - CLOSEST**2
+            guards.append(Guard("feet and spine in line", apart, ends=SINGULAR))
         return Turning(
             torques=found.torques,
             definitions={**self.references.definitions, **found.definitions},
             observables=self.reference_angles,
+            guards=tuple(guards),
             accelerations=found.accelerations if known else None,
             forces=found.forces if known else {},
-        )
-
-    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
-        """Those of walking, and the law's own end."""
-        closeness = self._law(motion, mode).closeness
-        if closeness is None:
-            return super().guards(motion, mode)
-        return (
-            *super().guards(motion, mode),
-            Guard("feet and spine in line", closeness**2 - CLOSEST**2, ends=SINGULAR),
         )
 
     def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
@@ -89,12 +86,6 @@ class ComputedTorque(Walker):
         counted = Footing.sticking_on(self.counted(bound.moment(point))).name
         found = bound.observe(counted, point.states[None], point.held)
         return np.array([found[f"torque_{joint}"][0] for joint in self.motors])
-
-    def _law(self, motion: LinkageMotion, mode: str) -> TrackedMotion:
-        counted = stands_in(self, mode.partition(BY)[2] or mode)
-        assert counted is not None
-        wanted = wanted_accelerations(self.references, motion)
-        return follow(motion, [Standing(foot, anchor(foot)) for foot in counted], wanted)
 
 
 def wanted_accelerations(references: References, motion: LinkageMotion) -> dict[str, sp.Expr]:

@@ -47,10 +47,10 @@ class Sampled(Walker):
         """Torques are held."""
         return Turning(self._torques, self.references.definitions, self.reference_angles)
 
-    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
+    def guards(self) -> tuple[Guard, ...]:
         """Those of walking, and the clock of the computer."""
         sample = Guard("sample", NEXT_SAMPLE - CLOCK, decide=_sampled, timed=True)
-        return (*super().guards(motion, mode), sample)
+        return (*super().guards(), sample)
 
     def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
         """The torques that are held."""

@@ -30,7 +30,6 @@ from flexspine.hybrid.compile import Array, BoundSystem
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
-from flexspine.mechanics.linkage_motion import LinkageMotion
 from flexspine.models.articulated import CLOCK, BoundRobot, anchor
 from flexspine.models.drive import Drive, Moment
 from flexspine.models.leg_geometry import Leg, legs_of
@@ -282,7 +281,7 @@ class Walker(Drive):
         """What the legs measure."""
         return self._measures
 
-    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
+    def guards(self) -> tuple[Guard, ...]:
         """The end of a swing; and no leg is longer than it is."""
         found = [Guard("swing over", SWING_END - CLOCK, decide=_swing_over, timed=True)]
         for name in self.walk.legs:

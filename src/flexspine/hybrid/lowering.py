@@ -7,6 +7,7 @@ computed once per run. Definitions become shared subexpressions.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import heyoka as hy
@@ -32,11 +33,8 @@ class Lowering:
         self._constant: dict[sp.Symbol, sp.Expr] = {symbol: symbol for symbol in parameters}
         self._first = first
         self._index: dict[sp.Expr, int] = {}
-        for symbol, expression in definitions.items():
-            if self._is_constant(expression):
-                self._constant[symbol] = expression.xreplace(self._constant)
-            else:
-                self._known[symbol] = self(expression)
+        # Those that nothing has asked for yet; many never are.
+        self._waiting = dict(definitions)
 
     @property
     def coefficients(self) -> list[sp.Expr]:
@@ -45,12 +43,34 @@ class Lowering:
 
     def __call__(self, expression: sp.Expr) -> Any:
         """Lower one expression."""
+        whole = sp.sympify(expression)
+        self._define(whole)
+        return self._lower(whole)
+
+    def _define(self, expression: sp.Expr) -> None:
+        """Lower the definitions that an expression needs and that wait."""
+        needed = set(_symbols(expression)) & self._waiting.keys()
+        if not needed:
+            return
+        for symbol in reversed(self._waiting):
+            if symbol in needed:
+                needed |= _symbols(self._waiting[symbol]) & self._waiting.keys()
+        for symbol in [each for each in self._waiting if each in needed]:
+            meant = self._waiting.pop(symbol)
+            if self._is_constant(meant):
+                self._constant[symbol] = meant.xreplace(self._constant)
+            else:
+                self._known[symbol] = self._lower(meant)
+
+    def _lower(self, expression: sp.Expr) -> Any:
         placeholders: dict[sp.Symbol, Any] = {}
-        folded = self._fold(sp.sympify(expression), placeholders)
-        return hy.from_sympy(folded, {**self._known, **placeholders})
+        folded = self._fold(expression, placeholders)
+        used = {symbol: self._known[symbol] for symbol in _symbols(folded) & self._known.keys()}
+        return hy.from_sympy(folded, {**used, **placeholders})
 
     def _is_constant(self, expression: sp.Expr) -> bool:
-        return bool(expression.free_symbols) and expression.free_symbols <= self._constant.keys()
+        symbols = _symbols(expression)
+        return bool(symbols) and symbols <= self._constant.keys()
 
     def _fold(self, expression: sp.Expr, placeholders: dict[sp.Symbol, Any]) -> sp.Expr:
         if expression.is_Number:
@@ -74,3 +94,9 @@ class Lowering:
         if expression.args:
             return expression.func(*(self._fold(arg, placeholders) for arg in expression.args))
         return expression
+
+
+@lru_cache(maxsize=1 << 16)
+def _symbols(expression: sp.Expr) -> frozenset[sp.Symbol]:
+    """The symbols of an expression; SymPy looks for them anew every time."""
+    return frozenset(expression.free_symbols)

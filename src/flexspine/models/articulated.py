@@ -358,7 +358,8 @@ class _Footed:
                 *(guard for foot in self.robot.feet for guard in self._contact(foot, forces)),
                 *self._falls(),
                 Guard("push", PUSH_TIME - CLOCK, decide=_pushed, timed=True),
-                *self.drive.guards(self.motion, self.name),
+                *self.drive.guards(),
+                *turning.guards,
             ),
             observables={
                 **{f"torque_{name}": torque for name, torque in turning.torques.items()},

@@ -35,13 +35,14 @@ class Moment:
 class Turning:
     """The torques of motors by joint, in symbols, in terms of ``definitions``.
 
-    A law that knows what the robot does under it may say so: ``accelerations`` of the motion's
-    coordinates and ``forces`` by foot.
+    ``guards`` tell where they cannot be had. A law that knows what the robot does under it may say
+    so: ``accelerations`` of the motion's coordinates and ``forces`` by foot.
     """
 
     torques: Mapping[str, sp.Expr] = field(default_factory=dict)
     definitions: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
     observables: Mapping[str, sp.Expr] = field(default_factory=dict)
+    guards: tuple[Guard, ...] = ()
     accelerations: list[sp.Expr] | None = None
     forces: Mapping[str, Point] = field(default_factory=dict)
 
@@ -83,8 +84,8 @@ class Drive:
         """The torques at a point, in the order of the motors, shape (m,)."""
         return np.zeros(bound.linkage.actuation.shape[1])
 
-    def guards(self, motion: LinkageMotion, mode: str) -> tuple[Guard, ...]:
-        """When it changes its mind, or gives up."""
+    def guards(self) -> tuple[Guard, ...]:
+        """When it changes its mind, or gives up, in any mode."""
         return ()
 
     def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
