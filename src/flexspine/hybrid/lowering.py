@@ -73,7 +73,7 @@ class Lowering:
         return bool(symbols) and symbols <= self._constant.keys()
 
     def _fold(self, expression: sp.Expr, placeholders: dict[sp.Symbol, Any]) -> sp.Expr:
-        if expression.is_Number:
+        if expression.is_Number or not _symbols(expression) & self._constant.keys():
             return expression
         if self._is_constant(expression):
             full = expression.xreplace(self._constant)

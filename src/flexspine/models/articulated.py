@@ -99,18 +99,23 @@ class Push:
 
 @dataclass(frozen=True)
 class Build:
-    """What driven robots have in common that share their compiled equations, and one of them."""
+    """What driven robots have in common that share their compiled equations, and one of them.
+
+    ``values`` are that one's numbers, by symbol.
+    """
 
     key: tuple[object, ...]
     drive: Drive = field(compare=False)
+    values: Mapping[sp.Symbol, float] = field(compare=False)
 
     @classmethod
     def like(cls, drive: Drive) -> Build:
         """The build of a driven robot: its parts, and which of its numbers vanish."""
         robot = drive.robot
-        names = tuple(complete_motion(robot).values)
+        values = complete_motion(robot).values
         parts = (robot.parents, robot.joints, robot.feet)
-        return cls((*(tuple(part.items()) for part in parts), names, drive.key), drive)
+        key = (*(tuple(part.items()) for part in parts), tuple(values), drive.key)
+        return cls(key, drive, values | drive.values())
 
 
 def complete_motion(robot: Robot) -> LinkageMotion:
@@ -162,9 +167,9 @@ class BoundRobot(BoundSystem):
         slides: bool = True,
         watch: Callable[[float], None] | None = None,
     ) -> None:
-        system = articulated_system(Build.like(drive))
-        own = complete_motion(drive.robot).values | drive.values()
-        own[PUSH_TIME] = -1.0 if push is None else push.time
+        build = Build.like(drive)
+        system = articulated_system(build)
+        own = {**build.values, PUSH_TIME: -1.0 if push is None else push.time}
         numbers = np.array([own[symbol] for symbol in system.parameters])
         super().__init__(compile_system(system, tolerance), numbers)
         self.drive, self.push, self.slides, self.watch = drive, push, slides, watch
