@@ -17,16 +17,8 @@ from PIL import Image
 from flexspine.errors import InputError, MachineError, OutputError, ParameterError
 from flexspine.report.caption import ending, heading
 from flexspine.report.postures import Posture, postures
-from flexspine.report.scene import (
-    DOTS,
-    Scene,
-    View,
-    add_force_key,
-    draw_ground,
-    draw_strokes,
-    pill,
-    write,
-)
+from flexspine.report.scene import Scene, pill, view_of
+from flexspine.report.stage import DOTS, View, add_force_key, draw_ground, draw_strokes, write
 from flexspine.report.stick_figure import Scale, StickFigure, bend_palette
 from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
 from flexspine.report.timeline import check_samples, last_cycle
@@ -178,7 +170,7 @@ def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
         raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
     shown = postures(dataset, np.linspace(*last_cycle(dataset), frames))
     scale = Scale.of(dataset)
-    view = View.of(shown, scale)
+    view = view_of(shown, scale)
     metre = CELL / (2 * view.aside)  # in
     height = (view.high - view.low) * metre
     rows = [shown[i : i + PER_ROW] for i in range(0, frames, PER_ROW)]
