@@ -7,13 +7,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.path import Path as Outline
 
 from flexspine.report.postures import SIDES, LegPosture, Point, Posture
-from flexspine.report.style import BEND_COLORS, INK, SIDE_COLORS
+from flexspine.report.style import BEND_COLORS, INK, SIDE_COLORS, paler
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,7 +156,7 @@ class StickFigure:
         return [
             (
                 self._line(5, color=color, width=TRUNK_WIDTH),
-                self._line(5.1, color=_paler(color), width=TRUNK_WIDTH - 0.045),
+                self._line(5.1, color=paler(color), width=TRUNK_WIDTH - 0.045),
             )
             for color in colors
         ]
@@ -221,8 +221,3 @@ def bend_palette(count: int) -> list[tuple[int, int, int]]:
 
 def _moved(point: Point, shift: float) -> Array:
     return np.array([point[0] + shift, point[1]])
-
-
-def _paler(color: str) -> str:
-    red, green, blue = (1 - 0.45 * (1 - part) for part in to_rgb(color))
-    return to_hex((red, green, blue))
