@@ -21,6 +21,7 @@ CONTROLLERS = {
     "pd": "joint springs and dampers",
 }
 
+WIDE = 115  # letters in a line of small type over a robot's pictures
 LONGEST_NAME = 60  # letters; what fits into a line of a title
 
 
@@ -28,9 +29,9 @@ def describe(dataset: xr.Dataset) -> list[str]:
     """Return what a reader must know about a run, in lines: parameters, energy, speed."""
     given: dict[str, Any] = json.loads(dataset.attrs.get("parameters", "{}"))
     if is_robot(dataset):
-        return joined([*_of_task(dataset), *_of_spine(given), *_mean_speed(dataset)]) + _changed(
-            dataset
-        )
+        spine = ", ".join(part.split(maxsplit=2)[2] for part in _of_spine(given))
+        parts = [*_of_task(dataset), f"spine {spine}"] if spine else _of_task(dataset)
+        return joined(parts + _mean_speed(dataset), WIDE) + _changed(dataset)
     parts = _of_spine(given)
     parts += of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     if any(given.get(f"{side}.leg.damping") for side in SIDES):

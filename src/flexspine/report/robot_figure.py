@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from flexspine.errors import ParameterError
-from flexspine.report.caption import describe, ending, heading, joined
+from flexspine.report.caption import WIDE, describe, ending, heading, joined
 from flexspine.report.robot_parts import RobotLeg, RobotParts, typical_force
 from flexspine.report.style import (
     FAINT,
@@ -65,7 +65,7 @@ def plot_robot(dataset: xr.Dataset, *, window: tuple[float, float] | None = None
     legs = [leg for leg in (parts.first("hind"), parts.first("fore")) if leg is not None]
     joints = [(leg, joint) for leg in legs for joint in leg.joints]
     with themed({"lines.linewidth": 1.2}):
-        details = joined([*describe(whole), _part(whole, limits)])
+        details = joined([*describe(whole), _part(whole, limits)], WIDE)
         early = ending(dataset)
         heights = [0.2 * len(parts.legs), *[0.62] * len(joints), 1.05, 1.05, 0.9, 0.9]
         size = (8.4, sum(heights) + 0.12 * len(heights) + 1.0 + LINE * len(details))

@@ -49,12 +49,13 @@ class RobotLeg:
 class RobotParts:
     """The parts of a robot by name; ``spine`` is the joint within the trunk, if there is one.
 
-    ``bends`` is 1 where a growing angle of it lets the back sag, -1 where it arches it.
+    ``spine_link`` turns at it; ``bends`` is 1 where a growing angle lets the back sag, else -1.
     """
 
     legs: tuple[RobotLeg, ...]
     trunk: tuple[str, ...]
     spine: str | None
+    spine_link: str | None
     bends: float
 
     @classmethod
@@ -75,7 +76,8 @@ class RobotParts:
             own = tuple(j for j in tree.upper_joints(links[leg], trunk) if j in motors)
             legs.append(RobotLeg(leg, foot, links[leg], own, sides[leg], near))
         spine = next((j for j in joints if {joints[j], parents[joints[j]]} <= {*trunk}), None)
-        return cls(tuple(legs), trunk, spine, _way(dataset, tree, spine))
+        turned = None if spine is None else joints[spine]
+        return cls(tuple(legs), trunk, spine, turned, _way(dataset, tree, turned))
 
     def first(self, side: str) -> RobotLeg | None:
         """Return the first leg of a side."""
@@ -145,10 +147,9 @@ def _sides(dataset: xr.Dataset, feet: Mapping[str, str]) -> dict[str, str]:
     return {name: "fore" if place >= middle else "hind" for name, place in x.items()}
 
 
-def _way(dataset: xr.Dataset, tree: _Tree, spine: str | None) -> float:
-    if spine is None:
+def _way(dataset: xr.Dataset, tree: _Tree, link: str | None) -> float:
+    if link is None:
         return 1.0
-    link = tree.joints[spine]
     x = _middles(dataset)
     return 1.0 if x[link] >= x[str(tree.parents[link])] else -1.0
 
