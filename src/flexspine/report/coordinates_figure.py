@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-BASE = (0.45, 0.3)  # of the longest way through the robot, where its base is
+BASE = (0.45, 0.3)  # where the base is, in lengths of two of the longest link
 ARC = 0.2  # radius of an angle's arc, in lengths of the longest link
 ARC_STEP = 0.11  # more for each further link at the same joint
 SPRING = 0.3  # size of a spring's sign, the same way
@@ -51,11 +51,13 @@ def plot_coordinates(robot: Robot) -> Figure:
     """
     linkage = robot.linkage
     q = told_apart(robot)
-    ends = np.array([[linkage.point(q, l.name, s) for s in (0.0, l.length)] for l in linkage.links])
+    ends = np.array(
+        [[linkage.point(q, each.name, s) for s in (0.0, each.length)] for each in linkage.links]
+    )
     with themed():
-        figure = Figure(figsize=(8.4, 6.4), layout="constrained")
+        figure = Figure(figsize=(8.4, 5.3), layout="constrained")
         axes = figure.subplots()
-        drawing = _Drawing(axes, robot, q, ends)
+        drawing = _Drawing(figure, axes, robot, q, ends)
         drawing.draw()
         _frame(axes, np.vstack([ends.reshape(-1, 2), drawing.strokes_points(), [[0.0, 0.0]]]))
         _add_key(figure)
@@ -84,17 +86,18 @@ def told_apart(robot: Robot) -> Array:
             turn = 180.0 if robot.parents[leg.thigh] == shank else 0.0
             angles[leg.thigh], angles[shank] = (angle + turn for angle in spread)
     absolute = np.radians([*angles.values(), 0.0, 0.0])
-    q: Array = np.linalg.solve(linkage.to_absolute, absolute)
-    q[:-2] = (q[:-2] + np.pi) % (2 * np.pi) - np.pi
+    relative = np.linalg.solve(linkage.to_absolute, absolute)[:-2]
     longest = max(link.length for link in linkage.links)
-    return q + np.array([*np.zeros(len(q) - 2), *(np.array(BASE) * 2 * longest)])
+    turns = (relative + np.pi) % (2 * np.pi) - np.pi
+    q: Array = np.array([*turns, *(2 * longest * place for place in BASE)])
+    return q
 
 
 class _Drawing:
     """What is drawn, and the words that are written beside it where there is room."""
 
-    def __init__(self, axes: Axes, robot: Robot, q: Array, ends: Array) -> None:
-        self.axes, self.robot, self.linkage = axes, robot, robot.linkage
+    def __init__(self, figure: Figure, axes: Axes, robot: Robot, q: Array, ends: Array) -> None:
+        self.figure, self.axes, self.linkage = figure, axes, robot.linkage
         self.q, self.ends = q, ends
         self.unit = max(link.length for link in self.linkage.links)
         self.strokes: list[Array] = []  # what words are not to hide
@@ -126,7 +129,7 @@ class _Drawing:
         base, n = self.ends[0, 0], len(self.linkage.links)
         for way, number in ((np.array([1.0, 0.0]), n + 1), (np.array([0.0, 1.0]), n + 2)):
             at = base * (1 - way)
-            self._arrow(at, base, GREEN)
+            self._arrow(at, base, GREEN, shrink=5.0)
             self.words.append((f"$q_{{{number}}}$", (at + base)[None] / 2, {"color": GREEN}))
             self._arrow(np.zeros(2), 0.45 * self.unit * way, INK)
             name = "x" if way[0] else "y"
@@ -157,10 +160,9 @@ class _Drawing:
         dashes = np.linspace(centre, centre + 1.35 * radius * ways[0], STEPS)
         self._stroke(dashes, color=INK, linewidth=0.7, linestyle=(0, (4, 3)), zorder=3)
         self._stroke(centre + radius * ways, color=BLUE, linewidth=1.1, zorder=4)
-        self.axes.annotate(
-            "", centre + radius * ways[-1], centre + radius * ways[-4],
-            arrowprops={"arrowstyle": "-|>", "color": BLUE, "shrinkA": 0, "shrinkB": 0},
-        )  # fmt: skip
+        look = {"arrowstyle": "-|>", "color": BLUE, "shrinkA": 0, "shrinkB": 0}
+        tail, tip = centre + radius * ways[-4], centre + radius * ways[-1]
+        self.axes.annotate("", _pair(tip), _pair(tail), arrowprops=look)
         spots = centre + radius * ways[[20, 14, 26, 8, 32]]
         self.words.append((text, spots, {"color": BLUE}))
 
@@ -168,10 +170,9 @@ class _Drawing:
         self.axes.plot(*points.T, solid_capstyle="round", **style)
         self.strokes.append(points)
 
-    def _arrow(self, tail: Array, tip: Array, color: str) -> None:
-        self.axes.annotate(
-            "", tip, tail, arrowprops={"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0}
-        )  # fmt: skip
+    def _arrow(self, tail: Array, tip: Array, color: str, shrink: float = 0.0) -> None:
+        look = {"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": shrink}
+        self.axes.annotate("", _pair(tip), _pair(tail), arrowprops=look)
         self.strokes.append(np.linspace(tail, tip, STEPS))
 
     def _name_of(self, link: str) -> str:
@@ -179,22 +180,27 @@ class _Drawing:
 
     def write(self) -> None:
         """Write the words where they hide nothing, angles first."""
-        canvas: Any = FigureCanvasAgg(self.axes.figure)
+        canvas: Any = FigureCanvasAgg(self.figure)
         canvas.draw()
         place = self.axes.transData.transform
-        taken, drawn = [], place(self.strokes_points())
+        taken: list[Bbox] = []
+        drawn = place(self.strokes_points())
+        common: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8}
         for words, spots, style in sorted(self.words, key=lambda each: "$" not in each[0]):
-            text = self.axes.text(
-                0, 0, words, ha="center", va="center", **{"fontsize": TEXT_SIZE, "zorder": 8, **style}
-            )  # fmt: skip
+            text = self.axes.text(0, 0, words, **{"fontsize": TEXT_SIZE, **common, **style})
             box = text.get_window_extent(canvas.get_renderer()).padded(2)
             spot = _free(box, place(spots), taken, drawn)
-            text.set_position(self.axes.transData.inverted().transform(spot))
+            text.set_position(_pair(self.axes.transData.inverted().transform(spot)))
             taken.append(box.translated(*(spot - _middle(box))))
 
 
+def _pair(place: Array) -> tuple[float, float]:
+    return float(place[0]), float(place[1])
+
+
 def _middle(box: Bbox) -> Array:
-    return np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2
+    middle: Array = np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2
+    return middle
 
 
 def _free(box: Bbox, spots: Array, taken: list[Bbox], drawn: Array) -> Array:
@@ -202,7 +208,8 @@ def _free(box: Bbox, spots: Array, taken: list[Bbox], drawn: Array) -> Array:
     size = np.array([box.width, box.height])
     ways = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     around = np.column_stack([np.cos(ways), np.sin(ways)])
-    best, least = spots[0], np.inf
+    best: Array = spots[0]
+    least = np.inf
     for far in (0.62, 0.8, 1.0, 1.3, 1.7, 2.2, 2.8):
         shifts = around * (size * [0.62, 0.8] + 14 * (far - 0.5))
         for shift in shifts:
