@@ -170,7 +170,7 @@ def _draw_forces(axes: Axes, dataset: xr.Dataset, legs: list[RobotLeg], axis: st
     if reach < most:
         axes.text(
             0.99, 0.96, f"up to {most:.0f} N", transform=axes.transAxes, ha="right", va="top",
-            fontsize=SMALL_SIZE,
+            fontsize=SMALL_SIZE, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
         )  # fmt: skip
     axes.set_ylabel(f"{'normal' if axis == 'y' else 'tangential'}\nGRF (N)")
     _few_ticks(axes)
@@ -197,7 +197,7 @@ def _draw_impulses(axes: Axes, dataset: xr.Dataset, legs: list[RobotLeg], axis: 
         twin.vlines(times[inside][hit], 0, values[hit], color=color, linewidth=_STEM["linewidth"])
         twin.plot(
             times[inside][hit], values[hit], color=color, linestyle="none", marker="o",
-            markerfacecolor="white", clip_on=False, **_STEM,
+            markerfacecolor="white", **_STEM,
         )  # fmt: skip
     # Twice the room, so that stems stay below the forces.
     twin.set_ylim(0 if axis == "y" else -2 * largest, 2 * largest)
