@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from flexspine import animate, load_robot
+from flexspine import animate, load_robot, plot_run, strip
 from flexspine.control.trot import Trot, trot
 from flexspine.errors import InputError, ParameterError
 from flexspine.models.robot_run import robot_dataset
@@ -211,6 +211,9 @@ def test_a_run_without_samples_is_refused(data: xr.Dataset, tmp_path: Path) -> N
     for draw in (plot_robot, lambda d: animate(d, tmp_path / "run.gif")):
         with pytest.raises(InputError, match="no samples"):
             draw(empty)
+    for draw in (plot_run, strip):
+        with pytest.raises(InputError, match="to_dataset"):
+            draw(data)
     with pytest.raises(InputError, match="robot_dataset"):
         plot_robot(data.drop_vars("grf"))
 

@@ -74,13 +74,13 @@ def animate(
     `OutputError` for a path that cannot be written to, and `MachineError` where the video encoder
     fails.
     """
-    check_samples(dataset)
+    robot = is_robot(dataset)
+    check_samples(dataset, robot=robot)
     path = Path(path)
     if path.suffix.lower() not in (".gif", ".mp4"):
         raise InputError(
             f"cannot write an animation as '{path.name}'", "give a name that ends in .gif or .mp4"
         )
-    robot = is_robot(dataset)
     if slow_down is None:
         slow_down = 1.0 if robot else SLOW_DOWN
     times = frame_times(drawable(dataset), fps, slow_down)

@@ -56,7 +56,7 @@ def plot_robot(dataset: xr.Dataset, *, window: tuple[float, float] | None = None
     shorter run. Joints and forces are those of the first rear and the first front leg. Raises
     `InputError` for a dataset without samples and `ParameterError` for a window without any.
     """
-    check_samples(dataset)
+    check_samples(dataset, robot=True)
     whole = drawable(dataset)
     limits = _limits(whole, window)
     time = whole["time"].values

@@ -43,15 +43,14 @@ def is_robot(dataset: xr.Dataset) -> bool:
     return "link" in dataset.dims
 
 
-def check_samples(dataset: xr.Dataset) -> None:
-    """Raise `InputError` for a dataset from which nothing can be drawn."""
+def check_samples(dataset: xr.Dataset, *, robot: bool = False) -> None:
+    """Raise `InputError` for a dataset from which no bounder, or robot, can be drawn."""
     if dataset.sizes.get("time", 0) == 0:
         message = dataset.attrs.get("message")
         raise InputError(
             f"the run has no samples{f' ({message})' if message else ''}",
             "look at its outcome and change the start or the options",
         )
-    robot = is_robot(dataset)
     for name in NEEDED_OF_ROBOTS if robot else NEEDED:
         if name not in dataset:
             maker = "robot_dataset" if robot else "to_dataset"
