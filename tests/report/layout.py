@@ -16,10 +16,11 @@ def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
     canvas.draw()
     renderer = canvas.get_renderer()
     unseen = {
-        id(tick.label1)
+        id(label)
         for axes in figure.axes
         for axis in (axes.xaxis, axes.yaxis)
         for tick in axis.get_major_ticks()
+        for label in (tick.label1, tick.label2)
         if not min(axis.get_view_interval()) <= tick.get_loc() <= max(axis.get_view_interval())
     }
     return [

@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 from subprocess import CalledProcessError
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
@@ -17,19 +17,12 @@ from PIL import Image
 from flexspine.errors import InputError, MachineError, OutputError, ParameterError
 from flexspine.report.caption import ending, heading
 from flexspine.report.postures import Posture, postures
-from flexspine.report.scene import (
-    DOTS,
-    Scene,
-    View,
-    add_force_key,
-    draw_ground,
-    draw_strokes,
-    pill,
-    write,
-)
+from flexspine.report.robot_scene import RobotScene
+from flexspine.report.scene import Scene, pill, view_of
+from flexspine.report.stage import DOTS, View, add_force_key, draw_ground, draw_strokes, write
 from flexspine.report.stick_figure import Scale, StickFigure, bend_palette
 from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
-from flexspine.report.timeline import check_samples, last_cycle
+from flexspine.report.timeline import check_samples, drawable, is_robot, last_cycle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,6 +35,7 @@ Color = tuple[int, int, int]
 
 # Twenty-four seconds at the usual rate: enough of any run.
 MAX_FRAMES = 600
+SLOW_DOWN = 8.0  # of bounders
 MAX_RATE = 100  # frames per second; a GIF counts time in hundredths of a second
 
 COLOR_SAMPLES = 10  # frames from which a GIF's 256 colours are taken
@@ -52,34 +46,51 @@ CELL = 1.9  # in, the width of one posture
 LABELS = 0.4  # in, below each row
 
 
+class Shown(Protocol):
+    """What moves: a figure that is brought to one posture after the other."""
+
+    figure: Figure
+    postures: list[Any]
+
+    def __init__(self, dataset: xr.Dataset, times: Array, slow_down: float) -> None: ...
+
+    def show(self, posture: Any) -> None:
+        """Bring the figure to a posture."""
+
+
 def animate(
     dataset: xr.Dataset,
     path: Path,
     *,
     fps: int = 25,
-    slow_down: float = 8.0,
+    slow_down: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
     """Write a run as an animated stick figure, ``slow_down`` times slower than real.
 
-    The suffix of ``path``, .gif or .mp4, gives the format. Of a run that needs more than 600
-    frames the last 600 are shown. ``progress`` is told the share that is done, 0 to 1. Raises
-    `InputError`, among them `OutputError` for a path that cannot be written to, and
-    `MachineError` where the video encoder fails.
+    If it is not given, bounders are slowed down eight times and robots not at all. The suffix of
+    ``path``, .gif or .mp4, gives the format. Of a run that needs more than 600 frames the last 600
+    are shown. ``progress`` is told the share that is done, 0 to 1. Raises `InputError`, among them
+    `OutputError` for a path that cannot be written to, and `MachineError` where the video encoder
+    fails.
     """
-    check_samples(dataset)
+    robot = is_robot(dataset)
+    check_samples(dataset, robot=robot)
     path = Path(path)
     if path.suffix.lower() not in (".gif", ".mp4"):
         raise InputError(
             f"cannot write an animation as '{path.name}'", "give a name that ends in .gif or .mp4"
         )
-    times = frame_times(dataset, fps, slow_down)
+    if slow_down is None:
+        slow_down = 1.0 if robot else SLOW_DOWN
+    times = frame_times(drawable(dataset), fps, slow_down)
     # Frames go to a file beside it, so that a failure leaves no half-written picture.
     part = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
     try:
         part.touch()
         with themed(_encoder() if path.suffix.lower() == ".mp4" else None):
-            scene = Scene(dataset, times, slow_down)
+            made: type[Shown] = RobotScene if robot else Scene
+            scene = made(dataset, times, slow_down)
             writer = _writer(part, fps, scene)
             with writer.saving(scene.figure, part, dpi=DOTS):
                 for number, posture in enumerate(scene.postures, start=1):
@@ -149,7 +160,7 @@ def _picture(figure: Any) -> Image.Image:
     return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
 
 
-def _writer(path: Path, fps: int, scene: Scene) -> AbstractMovieWriter:
+def _writer(path: Path, fps: int, scene: Shown) -> AbstractMovieWriter:
     if path.suffix == ".mp4":
         return FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20"])
     some = []
@@ -178,7 +189,7 @@ def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
         raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
     shown = postures(dataset, np.linspace(*last_cycle(dataset), frames))
     scale = Scale.of(dataset)
-    view = View.of(shown, scale)
+    view = view_of(shown, scale)
     metre = CELL / (2 * view.aside)  # in
     height = (view.high - view.low) * metre
     rows = [shown[i : i + PER_ROW] for i in range(0, frames, PER_ROW)]

@@ -7,22 +7,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexspine.report.timeline import is_robot
+
 if TYPE_CHECKING:
     import xarray as xr
 
 SIDES = ("fore", "hind")
 
-LONGEST_NAME = 56  # letters; what fits into a line of a title
+CONTROLLERS = {
+    "tracking": "computed torque",
+    "qp": "computed torque, least residual",
+    "com": "centre of mass, pitch and swing legs",
+    "pd": "joint springs and dampers",
+}
+
+WIDE = 115  # letters in a line of small type over a robot's pictures
+LONGEST_NAME = 60  # letters; what fits into a line of a title
 
 
 def describe(dataset: xr.Dataset) -> list[str]:
     """Return what a reader must know about a run, in lines: parameters, energy, speed."""
     given: dict[str, Any] = json.loads(dataset.attrs.get("parameters", "{}"))
-    parts = []
-    if "spine.stiffness" in given:
-        parts.append(f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad")
-        if given.get("spine.damping"):
-            parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
+    if is_robot(dataset):
+        spine = ", ".join(part.split(maxsplit=2)[2] for part in _of_spine(given))
+        parts = [*_of_task(dataset), f"spine {spine}"] if spine else _of_task(dataset)
+        return joined(parts + _mean_speed(dataset), WIDE) + _changed(dataset)
+    parts = _of_spine(given)
     parts += of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     if any(given.get(f"{side}.leg.damping") for side in SIDES):
         parts += of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
@@ -31,13 +41,45 @@ def describe(dataset: xr.Dataset) -> list[str]:
         both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
         parts.append(f"touchdown angles: {both}")
     parts.append(f"energy at the start {float(dataset['total_energy'][0]):.4g} J")
+    return joined(parts + _mean_speed(dataset)) + _changed(dataset)
+
+
+def _of_spine(given: dict[str, Any]) -> list[str]:
+    if "spine.stiffness" not in given:
+        return []
+    parts = [f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad"]
+    if given.get("spine.damping"):
+        parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
+    return parts
+
+
+def _of_task(dataset: xr.Dataset) -> list[str]:
+    """What a robot was asked for."""
+    asked: dict[str, Any] = json.loads(dataset.attrs.get("settings", "{}"))
+    parts = []
+    if "controller" in asked:
+        name = CONTROLLERS.get(asked["controller"], asked["controller"])
+        rate = f" at {asked['rate']:g} Hz" if asked.get("rate") else ""
+        parts.append(f"controller: {name}{rate}")
+    if "gait.speed" in asked:
+        parts.append(f"desired speed {asked['gait.speed']:g} m/s")
+    if asked.get("push"):
+        parts.append(f"push {asked['push']:g} N s")
+    return parts
+
+
+def _mean_speed(dataset: xr.Dataset) -> list[str]:
     duration = float(dataset["time"][-1] - dataset["time"][0])
-    if duration > 0:
-        moved = float(dataset["com_x"][-1] - dataset["com_x"][0])
-        parts.append(f"mean speed {moved / duration:#.3g} m/s")
+    if not duration > 0:
+        return []
+    x = dataset["com"][:, 0] if is_robot(dataset) else dataset["com_x"]
+    return [f"mean speed {float(x[-1] - x[0]) / duration:#.3g} m/s"]
+
+
+def _changed(dataset: xr.Dataset) -> list[str]:
     origins = json.loads(dataset.attrs.get("provenance", "{}"))
     changed = [name for name, origin in origins.items() if origin == "set by user"]
-    return joined(parts) + ([f"changed from the preset: {_few(changed)}"] if changed else [])
+    return [f"changed from the preset: {_few(changed)}"] if changed else []
 
 
 def of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str]:
@@ -70,6 +112,8 @@ def heading(dataset: xr.Dataset) -> str:
     """Return the name of what ran."""
     attrs = dataset.attrs
     name = f"{attrs.get('preset', 'run')}: {attrs.get('model', 'bounder').replace('-', ' ')}"
+    if is_robot(dataset):
+        name = attrs.get("title", "run of a robot")
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
 
 

@@ -21,8 +21,10 @@ from flexspine.report.style import (
     PHASE_COLORS,
     SIDE_COLORS,
     SMALL_SIZE,
+    add_legend,
     add_title,
     themed,
+    widen,
 )
 from flexspine.report.timeline import (
     PHASE_NAMES,
@@ -86,7 +88,7 @@ def _draw_height(axes: Axes, dataset: xr.Dataset) -> None:
     axes.plot(dataset["time"], dataset["com_y"], color=INK)
     axes.set_ylabel("CoM height (m)")
     axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
-    _widen(axes, 0.01)
+    widen(axes, 0.01)
 
 
 def _draw_pitch(axes: Axes, dataset: xr.Dataset) -> None:
@@ -103,8 +105,8 @@ def _draw_pitch(axes: Axes, dataset: xr.Dataset) -> None:
         )  # fmt: skip
     axes.set_ylabel("pitch (°)\nnose up positive")
     axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
-    _widen(axes, 2.0)
-    _add_legend(axes)
+    widen(axes, 2.0)
+    add_legend(axes)
 
 
 def _draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
@@ -119,7 +121,7 @@ def _draw_forces(axes: Axes, dataset: xr.Dataset) -> None:
     axes.set_ylabel("GRF magnitude\n(N per leg pair)")
     top = max(float(dataset[f"{side}_grf"].max()) for side in SIDES)
     axes.set_ylim(0, 1.06 * top or 1.0)
-    _add_legend(axes)
+    add_legend(axes)
 
 
 def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
@@ -135,7 +137,7 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
     axes.set_ylim(0, 100)
     axes.set_yticks([0, 25, 50, 75, 100])
     axes.set_ylabel("energy (% of\ninitial total)")
-    axes.legend(*_reversed(axes), **_PLACE)
+    add_legend(axes, *_reversed(axes))
     for name in ("legs", "spine", "dissipated"):
         if name in shares:
             color = ENERGY_COLORS[name]
@@ -146,7 +148,7 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
     elastic.set_ylim(bottom=0)
     elastic.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     elastic.set_ylabel("enlarged, not\nstacked (%)")
-    _add_legend(elastic)
+    add_legend(elastic)
 
 
 def _shares(dataset: xr.Dataset) -> dict[str, Array]:
@@ -209,27 +211,7 @@ def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:
     )  # fmt: skip
 
 
-_PLACE: dict[str, Any] = {
-    "loc": "center left",
-    "bbox_to_anchor": (1.0, 0.5),
-    "borderaxespad": 0.6,
-    "handlelength": 1.6,
-}
-
-
-def _add_legend(axes: Axes) -> None:
-    axes.legend(**_PLACE)
-
-
 def _reversed(axes: Axes) -> tuple[list[Any], list[str]]:
     """Legend entries in the order in which the areas lie on each other."""
     handles, labels = axes.get_legend_handles_labels()
     return handles[::-1], labels[::-1]
-
-
-def _widen(axes: Axes, least: float) -> None:
-    """Keep rounding errors of a constant from filling the panel."""
-    low, high = axes.get_ylim()
-    if high - low < least:
-        middle = (low + high) / 2
-        axes.set_ylim(middle - least / 2, middle + least / 2)

@@ -7,13 +7,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.path import Path as Outline
 
 from flexspine.report.postures import SIDES, LegPosture, Point, Posture
-from flexspine.report.style import BEND_COLORS, INK, SIDE_COLORS
+from flexspine.report.style import BEND_COLORS, INK, SIDE_COLORS, paler
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,6 +61,50 @@ class Scale:
         return ARROW_LENGTH * self.leg / self.force if self.force else 0.0
 
 
+class Canvas:
+    """Adds artists to axes; sizes are in lengths of the leg, each ``unit`` pt long."""
+
+    def __init__(self, axes: Axes, unit: float) -> None:
+        self.axes, self.unit = axes, unit
+
+    def line(self, order: float, *, color: str = INK, width: float = 0.034) -> Line2D:
+        """Add a rounded line."""
+        line = Line2D(
+            [], [], color=color, linewidth=width * self.unit, zorder=order,
+            solid_capstyle="round", solid_joinstyle="round",
+        )  # fmt: skip
+        self.axes.add_line(line)
+        return line
+
+    def dot(self, order: float, size: float, fill: str, edge: str = "none") -> Line2D:
+        """Add a disc."""
+        return self._marker(
+            order, marker="o", markersize=size * self.unit, markerfacecolor=fill,
+            markeredgecolor=edge, markeredgewidth=0.022 * self.unit,
+        )  # fmt: skip
+
+    def com(self, order: float) -> tuple[Line2D, Line2D]:
+        """Add the sign of a centre of mass."""
+        quarters = self._marker(
+            order + 1, marker=QUARTERS, markersize=0.1 * self.unit, markerfacecolor=INK,
+            markeredgecolor="none",
+        )  # fmt: skip
+        return self.dot(order, 0.1, "white", INK), quarters
+
+    def arrow(self, color: str, order: float = 2.0) -> Polygon:
+        """Add an arrow, to be given its outline."""
+        arrow = Polygon(
+            np.zeros((7, 2)), facecolor=color, edgecolor="none", zorder=order, alpha=0.75
+        )
+        self.axes.add_patch(arrow)
+        return arrow
+
+    def _marker(self, order: float, **style: Any) -> Line2D:
+        line = Line2D([], [], linestyle="none", zorder=order, **style)
+        self.axes.add_line(line)
+        return line
+
+
 class StickFigure:
     """The artists of an animal like ``example``; `show` moves them to a posture.
 
@@ -68,18 +112,18 @@ class StickFigure:
     """
 
     def __init__(self, axes: Axes, scale: Scale, points_per_metre: float, example: Posture) -> None:
-        self.axes, self.scale = axes, scale
-        self.unit = scale.leg * points_per_metre  # pt per length of the leg
+        self.scale = scale
+        canvas = self.canvas = Canvas(axes, scale.leg * points_per_metre)
         self.jointed = example.joint is not None
-        self.arrows = {side: self._add_arrow(SIDE_COLORS[side]) for side in SIDES}
+        self.arrows = {side: canvas.arrow(SIDE_COLORS[side]) for side in SIDES}
         self.trunk = self._add_trunk()
-        self.legs = {side: self._line(3, color=SIDE_COLORS[side]) for side in SIDES}
-        self.toes = {side: self._dot(4, 0.055, SIDE_COLORS[side]) for side in SIDES}
-        self.hips = {side: self._dot(6, 0.085, "white", SIDE_COLORS[side]) for side in SIDES}
+        self.legs = {side: canvas.line(3, color=SIDE_COLORS[side]) for side in SIDES}
+        self.toes = {side: canvas.dot(4, 0.055, SIDE_COLORS[side]) for side in SIDES}
+        self.hips = {side: canvas.dot(6, 0.085, "white", SIDE_COLORS[side]) for side in SIDES}
         if self.jointed:
-            self.joint = self._dot(7, 0.085, "white", INK)
-            self.spring = (self._line(8, width=0.052), self._line(8.1, width=0.03))
-        self.com = (self._dot(9, 0.1, "white", INK), self._com_quarters())
+            self.joint = canvas.dot(7, 0.085, "white", INK)
+            self.spring = (canvas.line(8, width=0.052), canvas.line(8.1, width=0.03))
+        self.com = canvas.com(9)
 
     def show(self, posture: Posture, shift: float = 0.0) -> None:
         """Move to a posture, ``shift`` m ahead of where it is."""
@@ -101,7 +145,7 @@ class StickFigure:
         line, dot = self.legs[side], self.toes[side]
         width = ZIGZAG_WIDTH * self.scale.leg * (1.0 if leg.stands else 0.6)
         line.set_data(*zigzag(hip, toe, width).T)
-        line.set_linewidth(self.unit * (0.034 if leg.stands else 0.018))
+        line.set_linewidth(self.canvas.unit * (0.034 if leg.stands else 0.018))
         line.set_alpha(1.0 if leg.stands else 0.5)
         dot.set_data([toe[0]], [toe[1]])
         dot.set_alpha(1.0 if leg.stands else 0.5)
@@ -125,46 +169,16 @@ class StickFigure:
         self.spring[1].set_color(bend_color(bend, self.scale))
         self.joint.set_data([centre[0]], [centre[1]])
 
-    def _line(self, order: float, *, color: str = INK, width: float = 0.034) -> Line2D:
-        line = Line2D(
-            [], [], color=color, linewidth=width * self.unit, zorder=order,
-            solid_capstyle="round", solid_joinstyle="round",
-        )  # fmt: skip
-        self.axes.add_line(line)
-        return line
-
-    def _dot(self, order: float, size: float, fill: str, edge: str = "none") -> Line2D:
-        return self._marker(
-            order, marker="o", markersize=size * self.unit, markerfacecolor=fill,
-            markeredgecolor=edge, markeredgewidth=0.022 * self.unit,
-        )  # fmt: skip
-
-    def _com_quarters(self) -> Line2D:
-        return self._marker(
-            10, marker=QUARTERS, markersize=0.1 * self.unit, markerfacecolor=INK,
-            markeredgecolor="none",
-        )  # fmt: skip
-
-    def _marker(self, order: float, **style: Any) -> Line2D:
-        line = Line2D([], [], linestyle="none", zorder=order, **style)
-        self.axes.add_line(line)
-        return line
-
     def _add_trunk(self) -> list[tuple[Line2D, Line2D]]:
         """Bars with an outline: a wide line under a narrower one."""
         colors = [SIDE_COLORS["hind"], SIDE_COLORS["fore"]] if self.jointed else [BODY_COLOR]
         return [
             (
-                self._line(5, color=color, width=TRUNK_WIDTH),
-                self._line(5.1, color=_paler(color), width=TRUNK_WIDTH - 0.045),
+                self.canvas.line(5, color=color, width=TRUNK_WIDTH),
+                self.canvas.line(5.1, color=paler(color), width=TRUNK_WIDTH - 0.045),
             )
             for color in colors
         ]
-
-    def _add_arrow(self, color: str) -> Polygon:
-        arrow = Polygon(np.zeros((7, 2)), facecolor=color, edgecolor="none", zorder=2, alpha=0.75)
-        self.axes.add_patch(arrow)
-        return arrow
 
 
 def zigzag(start: Array, end: Array, width: float) -> Array:
@@ -221,8 +235,3 @@ def bend_palette(count: int) -> list[tuple[int, int, int]]:
 
 def _moved(point: Point, shift: float) -> Array:
     return np.array([point[0] + shift, point[1]])
-
-
-def _paler(color: str) -> str:
-    red, green, blue = (1 - 0.45 * (1 - part) for part in to_rgb(color))
-    return to_hex((red, green, blue))

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ORANGE = "#E69F00"
@@ -118,3 +119,30 @@ def add_title(
         )  # fmt: skip
     room = 0.38 + LINE * (len(lines) - 1)
     figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - room / height))
+
+
+def add_legend(axes: Axes, *entries: list[Any], aside: float = 0.0) -> None:
+    """Put a legend to the right of a panel, ``aside`` widths of it further where a scale stands.
+
+    ``entries`` are handles and labels, if not all.
+    """
+    axes.legend(
+        *entries, loc="center left", bbox_to_anchor=(1.0 + aside, 0.5), borderaxespad=0.6,
+        handlelength=1.6,
+    )  # fmt: skip
+
+
+def widen(axes: Axes, least: float) -> None:
+    """Keep rounding errors of a constant from filling the panel."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        middle = (low + high) / 2
+        axes.set_ylim(middle - least / 2, middle + least / 2)
+
+
+def paler(color: str) -> str:
+    """Return a tint of a colour."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    red, green, blue = (1 - 0.45 * (1 - part) for part in to_rgb(color))
+    return to_hex((red, green, blue))

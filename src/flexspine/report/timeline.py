@@ -34,23 +34,43 @@ class Span(NamedTuple):
     last: int
 
 
-def check_samples(dataset: xr.Dataset) -> None:
-    """Raise `InputError` for a dataset from which nothing can be drawn."""
+NEEDED = ("com_x", "com_y", "phase", "event_time")
+NEEDED_OF_ROBOTS = ("com", "foot", "stands", "grf", "link_start", "footing", "event_time")
+
+
+def is_robot(dataset: xr.Dataset) -> bool:
+    """Tell a run of an articulated robot from one of a bounder."""
+    return "link" in dataset.dims
+
+
+def check_samples(dataset: xr.Dataset, *, robot: bool = False) -> None:
+    """Raise `InputError` for a dataset from which no bounder, or robot, can be drawn."""
     if dataset.sizes.get("time", 0) == 0:
         message = dataset.attrs.get("message")
         raise InputError(
             f"the run has no samples{f' ({message})' if message else ''}",
             "look at its outcome and change the start or the options",
         )
-    for name in ("com_x", "com_y", "phase", "event_time"):
+    for name in NEEDED_OF_ROBOTS if robot else NEEDED:
         if name not in dataset:
-            raise InputError(f"the dataset has no '{name}'", "give one made by to_dataset")
+            maker = "robot_dataset" if robot else "to_dataset"
+            raise InputError(f"the dataset has no '{name}'", f"give one made by {maker}")
 
 
-def phase_spans(dataset: xr.Dataset) -> list[Span]:
-    """Return the phases in order; they meet at the times of the events between the samples."""
+def drawable(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a run without the last sample if that has left all bounds."""
+    if dataset.attrs.get("outcome") == "diverged" and dataset.sizes["time"] > 1:
+        return dataset.isel(time=slice(None, -1))
+    return dataset
+
+
+def phase_spans(dataset: xr.Dataset, name: str = "phase") -> list[Span]:
+    """Return the phases in order; they meet at the times of the events between the samples.
+
+    ``name`` is what tells them.
+    """
     time = dataset["time"].values
-    phase = dataset["phase"].values.astype(str)
+    phase = dataset[name].values.astype(str)
     met = np.sort(dataset["event_time"].values)
     firsts = [0, *(np.flatnonzero(phase[1:] != phase[:-1]) + 1)]
     starts = [float(time[0])]
