@@ -25,6 +25,9 @@ from flexspine.models.robot import Robot
 # Angle, rate and acceleration.
 Motion = tuple[sp.Expr, sp.Expr, sp.Expr]
 
+# Place, velocity and acceleration.
+Course = tuple[sp.Matrix, sp.Matrix, sp.Matrix]
+
 Define = Callable[[str, sp.Expr], sp.Symbol]
 
 
@@ -45,14 +48,12 @@ class BodyCourse:
     start: sp.Symbol
     height: sp.Symbol
 
-    def motion(self) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-        """Place, speed and acceleration along x."""
+    def motion(self) -> Course:
+        """Place, velocity and acceleration."""
         since = CLOCK - self.start
-        return (
-            self.x + self.speed * since + self.gain * since**2 / 2,
-            self.speed + self.gain * since,
-            self.gain,
-        )
+        x = self.x + self.speed * since + self.gain * since**2 / 2
+        place = sp.Matrix([x, self.height])
+        return place, place.diff(CLOCK), place.diff(CLOCK, 2)
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class FootPath:
         """The path of a leg's foot."""
         return cls(*(_symbol(f"path_{each.name}_{leg}") for each in fields(cls)))
 
-    def motion(self) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+    def motion(self) -> Course:
         """Place, velocity and acceleration."""
         since = CLOCK - self.start
         share, turn = since / self.span, 2 * sp.pi / self.span
@@ -120,8 +121,10 @@ class References:
     stretch: Mapping[str, sp.Expr]
 
 
-def references(robot: Robot, legs: Mapping[str, Leg]) -> References:
-    """What the motors' joints are to do, from the body's course and the feet's paths."""
+def references(
+    robot: Robot, legs: Mapping[str, Leg], body: Course, feet: Mapping[str, Course]
+) -> References:
+    """What the motors' joints are to do, from what the middle of the trunk and the feet are to."""
     definitions: dict[sp.Symbol, sp.Expr] = {}
 
     def define(name: str, expression: sp.Expr) -> sp.Symbol:
@@ -131,16 +134,14 @@ def references(robot: Robot, legs: Mapping[str, Leg]) -> References:
 
     links: dict[str, Motion] = {}
     stretch = {}
-    body = BODY.motion()
     for name, leg in legs.items():
-        foot = FootPath.of(name).motion()
-        hips = [sp.Matrix([body[0] + leg_number("hip", name), BODY.height])]
-        hips += [sp.Matrix([each, 0]) for each in body[1:]]
+        place, *rest = body
+        hips = [place + sp.Matrix([leg_number("hip", name), 0]), *rest]
         reach = [
             sp.Matrix(
                 [define(f"reach_{axis}{order}_{name}", part[i]) for i, axis in enumerate("xy")]
             )
-            for order, part in enumerate(f - h for f, h in zip(foot, hips, strict=True))
+            for order, part in enumerate(f - h for f, h in zip(feet[name], hips, strict=True))
         ]
         lengths = leg_number("thigh", name), leg_number("shank", name)
         stretch[name] = define(f"stretch_{name}", sp.sqrt(reach[0].dot(reach[0])))

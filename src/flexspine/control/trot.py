@@ -108,7 +108,7 @@ def driven(robot: Robot, asked: Trot) -> Walker:
     if rate is not None:
         law = CONTROLLERS[asked.controller](**gains)
         limit = inf if asked.limit is None else asked.limit
-        made: Walker = Sampled(robot, asked.gait, law=law, rate=rate, limit=limit)
+        made: Walker = Sampled(robot, gait=asked.gait, law=law, rate=rate, limit=limit)
     elif asked.limit is not None:
         raise ParameterError(
             f"torques are limited to {asked.limit:g} N m, but not sampled",

@@ -205,7 +205,8 @@ class Walker(Drive):
     @cached_property
     def references(self) -> References:
         """What joints are to do."""
-        return references(self.robot, self.walk.legs)
+        feet = {name: FootPath.of(name).motion() for name in self.walk.legs}
+        return references(self.robot, self.walk.legs, BODY.motion(), feet)
 
     @cached_property
     def motors(self) -> list[str]:
@@ -321,10 +322,6 @@ class Walker(Drive):
         q = self.posture(held)
         start = self.ready(bound.stand(q, np.zeros_like(q), held))
         return bound.carry_on(start, bound.at_rest(q))
-
-    def ready(self, start: Moment) -> Moment:
-        """What there is to do before the first step."""
-        return start
 
 
 def _swing_over(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:

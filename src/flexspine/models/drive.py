@@ -88,6 +88,10 @@ class Drive:
         """When it changes its mind, or gives up, in any mode."""
         return ()
 
+    def ready(self, start: Moment) -> Moment:
+        """What there is to do before the beginning."""
+        return start
+
     def after_landing(self, moment: Moment, landed: tuple[str, ...]) -> Moment:
         """What it makes of an impact at which feet landed."""
         return moment

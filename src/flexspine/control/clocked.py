@@ -1,0 +1,106 @@
+"""A drive with a computer: it chooses torques at a rate, and holds them until the next time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import sympy as sp
+
+from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.outcome import Outcome, OutcomeKind
+from flexspine.hybrid.system import Guard
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.mechanics.linkage_motion import LinkageMotion
+from flexspine.models.articulated import CLOCK, BoundRobot
+from flexspine.models.drive import Drive, Moment, Turning
+
+NEXT_SAMPLE = sp.Symbol("next_sample", real=True)
+
+# rad/s; no joint of a robot that is under control turns as fast.
+FASTEST = 1e3
+
+NO_TORQUES = OutcomeKind(
+    "no_torques",
+    "no torques do what the law wants; take another posture, shorter steps, or higher limits",
+)
+
+OUT_OF_CONTROL = OutcomeKind(
+    "out_of_control",
+    "torques that are held for so long shake the joints ever more; sample more often, or lower "
+    "the stiffness and damping of the law",
+)
+
+
+@dataclass(frozen=True)
+class Clocked(Drive):
+    """Torques that are chosen ``rate`` times a second; ``limit`` bounds them, in N m."""
+
+    rate: float = 400.0
+    limit: float = np.inf
+
+    def held(self) -> tuple[sp.Symbol, ...]:
+        """The torques, and when they change next."""
+        return (*super().held(), *self.held_torques.values(), NEXT_SAMPLE)
+
+    def turning(self, motion: LinkageMotion, mode: str) -> Turning:
+        """Torques are held."""
+        definitions, observables = self.observed()
+        return Turning(self.held_torques, definitions, observables)
+
+    def observed(self) -> tuple[Mapping[sp.Symbol, sp.Expr], Mapping[str, sp.Expr]]:
+        """What else is worth observing, in terms of definitions."""
+        return {}, {}
+
+    def guards(self) -> tuple[Guard, ...]:
+        """The clock of the computer."""
+        sample = Guard("sample", NEXT_SAMPLE - CLOCK, decide=_sampled, timed=True)
+        return (*super().guards(), sample)
+
+    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+        """The torques that are held."""
+        moment = bound.moment(point)
+        return np.array([moment.held[symbol] for symbol in self.held_torques.values()])
+
+    def ready(self, start: Moment) -> Moment:
+        """Choose the first torques."""
+        return self.sample(start)
+
+    def sample(self, moment: Moment) -> Moment:
+        """Choose new torques. Raises `numpy.linalg.LinAlgError` where there are none."""
+        chosen, remembered = self.choose(moment)
+        torques = chosen.clip(-self.limit, self.limit).tolist()
+        # Counted, so that no rounding errors add up.
+        count = round(moment.time * self.rate) + 1
+        held = {**moment.held, **remembered, NEXT_SAMPLE: count / self.rate}
+        return replace(
+            moment, held=held | dict(zip(self.held_torques.values(), torques, strict=True))
+        )
+
+    def choose(self, moment: Moment) -> tuple[Array, Mapping[sp.Symbol, float]]:
+        """The torques (m,), and what to remember."""
+        return np.zeros(len(self.held_torques)), {}
+
+    @cached_property
+    def held_torques(self) -> dict[str, sp.Symbol]:
+        """The symbols of the torques, by joint."""
+        motors = [joint for joint, (_, motor) in self.robot.joints.items() if motor]
+        return {joint: sp.Symbol(f"held_torque_{joint}", real=True) for joint in motors}
+
+
+def _sampled(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:
+    """The computer chooses new torques."""
+    assert isinstance(bound, BoundRobot)
+    drive, moment = bound.drive, bound.moment(point)
+    assert isinstance(drive, Clocked)
+    fastest = float(np.abs(moment.rates[:-2]).max())
+    if not fastest < FASTEST:
+        text = f"a joint turns at {fastest:.3g} rad/s at t = {moment.time:.6g} s"
+        return Outcome(OUT_OF_CONTROL, text)
+    try:
+        chosen = drive.sample(moment)
+    except np.linalg.LinAlgError as failure:
+        return Outcome(NO_TORQUES, f"{failure} at t = {moment.time:.6g} s")
+    return bound.carry_on(chosen, point.states)
