@@ -23,6 +23,7 @@ from flexspine.cli import (
     presets,
     study,
     sweep,
+    verify,
 )
 from flexspine.cli.output import fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
@@ -58,6 +59,7 @@ app.command("basin")(basin.basin)
 app.command("map")(gait_map.gait_map)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
+app.add_typer(verify.app, name="verify")
 app.add_typer(cache.app, name="cache")
 
 
