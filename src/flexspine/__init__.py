@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from flexspine.report.basin_figure import plot_basin
     from flexspine.report.figure import plot_run
     from flexspine.report.map_figure import plot_map
+    from flexspine.report.pinned_figure import plot_pinned
     from flexspine.studies.basin import Basin, basin_plan, read_basins
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
+    from flexspine.studies.pinned_check import PinnedCheck, check_pinned
     from flexspine.studies.plan import Plan
     from flexspine.studies.plan_file import read_plan
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
@@ -48,6 +50,7 @@ _HOMES = {
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
     "Model": "models.model",
+    "PinnedCheck": "studies.pinned_check",
     "Plan": "studies.plan",
     "Rerun": "studies.sweep",
     "ReturnMap": "gaits.return_map",
@@ -58,6 +61,7 @@ _HOMES = {
     "Sweep": "studies.sweep",
     "animate": "report.animation",
     "basin_plan": "studies.basin",
+    "check_pinned": "studies.pinned_check",
     "examine": "gaits.gait",
     "find_gaits": "gaits.search",
     "floquet_multipliers": "gaits.stability",
@@ -67,6 +71,7 @@ _HOMES = {
     "map_plan": "studies.gait_map",
     "plot_basin": "report.basin_figure",
     "plot_map": "report.map_figure",
+    "plot_pinned": "report.pinned_figure",
     "plot_run": "report.figure",
     "preset_names": "models.presets",
     "read_basins": "studies.basin",
@@ -98,6 +103,7 @@ __all__ = [
     "Landmark",
     "MachineError",
     "Model",
+    "PinnedCheck",
     "Plan",
     "Rerun",
     "ReturnMap",
@@ -109,6 +115,7 @@ __all__ = [
     "__version__",
     "animate",
     "basin_plan",
+    "check_pinned",
     "examine",
     "find_gaits",
     "floquet_multipliers",
@@ -118,6 +125,7 @@ __all__ = [
     "map_plan",
     "plot_basin",
     "plot_map",
+    "plot_pinned",
     "plot_run",
     "preset_names",
     "read_basins",

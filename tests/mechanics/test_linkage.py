@@ -19,14 +19,19 @@ SAME = 1e-12
 
 
 class Engine:
-    """The same tree in Pinocchio: prismatic x and y, then a revolute joint for every link."""
+    """The same tree in Pinocchio: prismatic x and y, then a revolute joint for every link.
 
-    def __init__(self, linkage: Linkage) -> None:
+    ``pinned``: its base stays where it is, without x and y.
+    """
+
+    def __init__(self, linkage: Linkage, pinned: bool = False) -> None:
         self.linkage, self.model = linkage, pinocchio.Model()
         self.model.gravity.linear = np.array([0.0, -linkage.gravity, 0.0])
         still = pinocchio.SE3.Identity()
-        base = self.model.addJoint(0, pinocchio.JointModelPX(), still, "x")
-        base = self.model.addJoint(base, pinocchio.JointModelPY(), still, "y")
+        base = 0
+        if not pinned:
+            base = self.model.addJoint(base, pinocchio.JointModelPX(), still, "x")
+            base = self.model.addJoint(base, pinocchio.JointModelPY(), still, "y")
         joints: dict[str, int] = {}
         for link in linkage.links:
             place = pinocchio.SE3(np.eye(3), np.array([link.at, 0.0, 0.0]))

@@ -24,6 +24,7 @@ from flexspine.cli import (
     study,
     sweep,
     trot,
+    verify,
 )
 from flexspine.cli.output import fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
@@ -60,6 +61,7 @@ app.command("map")(gait_map.gait_map)
 app.command("trot")(trot.trot)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
+app.add_typer(verify.app, name="verify")
 app.add_typer(cache.app, name="cache")
 
 

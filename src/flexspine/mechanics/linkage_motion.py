@@ -149,6 +149,17 @@ class LinkageMotion:
         child, parent = self._at(joint)
         return self.rates[child] - self.rates[parent]
 
+    def damper_power(self) -> sp.Expr:
+        """What the dampers of all joints take up."""
+        return sum(
+            (
+                self.parameter(f"{joint.name}_damping", joint.damping)
+                * self.bend_rate(joint.name) ** 2
+                for joint in self.linkage.joints
+            ),
+            sp.S.Zero,
+        )
+
     def foot(self, name: str) -> Point:
         """Where a foot is."""
         return self._place(self._arms(name))

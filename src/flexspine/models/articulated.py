@@ -390,10 +390,7 @@ class _Footed:
 
     def _power_lost(self, forces: Mapping[str, Point]) -> sp.Expr:
         """In dampers, and by feet that slide."""
-        lost = sp.S.Zero
-        for joint in self.robot.linkage.joints:
-            damping = self.motion.parameter(f"{joint.name}_damping", joint.damping)
-            lost += damping * self.motion.bend_rate(joint.name) ** 2
+        lost = self.motion.damper_power()
         if self.usual is None:
             for foot, (tangent, _) in forces.items():
                 _, slides = flags_of(foot)

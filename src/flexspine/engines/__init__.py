@@ -1,0 +1,1 @@
+"""Other people's rigid-body engines, fed with the same descriptions."""

@@ -1,0 +1,159 @@
+"""A planar robot pinned by a foot in MuJoCo, which knows none of our equations.
+
+The tree is walked from that foot, so that hinges alone hold the robot there: MuJoCo's equality
+constraints are springs, and would let it give way.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexspine.errors import MachineError
+from flexspine.mechanics.linkage import Array, Link, Linkage
+from flexspine.mechanics.rerooting import rerooted
+
+# Versions from the first up to the second: 4.0.0 gets accelerations wrong.
+VERSIONS = (3, 17), (4, 0)
+
+REMEDY = "pip install 'flexspine[engine]'"
+
+# kg m^2; MuJoCo takes no body without inertia, and this much is less than rounding errors.
+LEAST_INERTIA = 2e-15
+
+
+class Motion(NamedTuple):
+    """What an engine has found: absolute angles in rad (k, links) and the total energy in J (k,).
+
+    The energy is kinetic, of weight with zero at the foot, and of springs.
+    """
+
+    angles: Array
+    energies: Array
+
+
+class PinnedMujoco:
+    """A linkage in MuJoCo that turns about one of its feet, which is the origin.
+
+    ``model`` and ``data`` are MuJoCo's; its joints are named after the links that they move. Raises
+    `MachineError` if MuJoCo is not there or has a version that is not supported.
+    """
+
+    def __init__(self, linkage: Linkage, foot: str) -> None:
+        self._mujoco = _mujoco()
+        self._tree = rerooted(linkage, foot)
+        self.model = _specification(self._mujoco, self._tree).compile()
+        self.data = self._mujoco.MjData(self.model)
+        # Where each of the tree's links stands among those of the linkage.
+        self._order = [linkage.place[link.name] for link in self._tree.links]
+
+    def run(self, angles: Array, step: float, count: int, every: int) -> Motion:
+        """Let go from rest at absolute ``angles`` (rad), by ``count`` Runge-Kutta steps (s).
+
+        Returns the start and every ``every``-th step after it; NaN from where it diverged.
+        """
+        self._mujoco.mj_resetData(self.model, self.data)
+        self.model.opt.timestep = step
+        self.data.qpos[:] = self._relative(angles)
+        found = [self._now()]
+        with self._unheard():
+            for number in range(1, count + 1):
+                self._mujoco.mj_step(self.model, self.data)
+                if number % every == 0:
+                    found.append(self._now())
+        turns, energies = zip(*found, strict=True)
+        return Motion(np.array(turns), np.array(energies))
+
+    def _relative(self, angles: Array) -> Array:
+        """MuJoCo's joint angles."""
+        n = len(angles)
+        relative: Array = self._tree.to_relative[:n, :n] @ angles[self._order]
+        return relative
+
+    def _now(self) -> tuple[Array, float]:
+        """Absolute angles, in the order of the linkage, and the energy."""
+        self._mujoco.mj_forward(self.model, self.data)
+        angles = np.empty(len(self._order))
+        n = len(angles)
+        angles[self._order] = self._tree.to_absolute[:n, :n] @ self.data.qpos
+        return angles, float(self.data.energy.sum())
+
+    @contextmanager
+    def _unheard(self) -> Iterator[None]:
+        """Keep MuJoCo's warnings out of the terminal, and its log out of the working directory."""
+        before = self._mujoco.get_mju_user_warning()
+        self._mujoco.set_mju_user_warning(lambda _text: None)
+        try:
+            yield
+        finally:
+            self._mujoco.set_mju_user_warning(before)
+
+
+def mujoco_version() -> str:
+    """The version of MuJoCo that is used. Raises `MachineError` as `PinnedMujoco` does."""
+    return str(_mujoco().__version__)
+
+
+def _mujoco() -> Any:
+    try:
+        mujoco = import_module("mujoco")
+    except ImportError:
+        raise MachineError("the package 'mujoco' is not installed", REMEDY) from None
+    oldest, barred = VERSIONS
+    if not oldest <= tuple(map(int, re.findall(r"\d+", mujoco.__version__)[:2])) < barred:
+        ours, theirs = (".".join(map(str, version)) for version in VERSIONS)
+        raise MachineError(
+            f"mujoco {mujoco.__version__} is installed, and only {ours} up to but not including "
+            f"{theirs} will do",
+            REMEDY,
+        )
+    return mujoco
+
+
+def _specification(mujoco: Any, tree: Linkage) -> Any:
+    """The tree in MuJoCo's terms: our plane is that of its x and y, gravity acts against y."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.gravity = [0.0, -tree.gravity, 0.0]
+    off = mujoco.mjtDisableBit
+    # A run that diverged is not to begin anew behind our back.
+    spec.option.disableflags = int(off.mjDSBL_CONSTRAINT | off.mjDSBL_AUTORESET)
+    spec.option.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    joints = {joint.link: joint for joint in tree.joints}
+    bodies: dict[str | None, Any] = {None: spec.worldbody}
+    for link in tree.links:
+        mass, com, inertia = _with_feet(tree, link)
+        body = bodies[link.name] = bodies[link.parent].add_body(
+            name=link.name,
+            pos=[link.at, 0.0, 0.0],
+            mass=mass,
+            ipos=[com, 0.0, 0.0],
+            # Only turns about z matter; a body has to be possible in space all the same.
+            inertia=[max(inertia, LEAST_INERTIA)] * 3,
+            explicitinertial=True,
+        )
+        hinge = body.add_joint(
+            name=link.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0]
+        )
+        joint = joints.get(link.name)
+        if joint is not None:
+            # Forces may have quadratic and cubic parts there; ours are linear.
+            hinge.stiffness, hinge.damping = [joint.stiffness, 0, 0], [joint.damping, 0, 0]
+            hinge.springref = joint.rest
+    return spec
+
+
+def _with_feet(tree: Linkage, link: Link) -> tuple[float, float, float]:
+    """Mass, centre of mass and inertia about it of a link with its feet, which are points."""
+    parts = [(link.mass, link.com, link.inertia)]
+    parts += [(foot.mass, foot.at, 0.0) for foot in tree.feet if foot.link == link.name]
+    mass = sum(part for part, _, _ in parts)
+    com = sum(part * at for part, at, _ in parts) / mass
+    return mass, com, sum(own + part * (at - com) ** 2 for part, at, own in parts)
