@@ -213,6 +213,9 @@ class JointSprings(Law):
         """The torques (m,)."""
         motors = now.linkage.actuation.T
         angle, rate, _ = now.joints
-        pull: Array = self.stiffness * (angle - motors @ now.q)
-        pull += self.damping * (rate - motors @ now.rates)
-        return pull
+        return self.pull(angle - motors @ now.q, rate - motors @ now.rates)
+
+    def pull(self, off: Array, off_rate: Array) -> Array:
+        """The torques that take away what angles and rates are off, shape (m,)."""
+        torques: Array = self.stiffness * off + self.damping * off_rate
+        return torques

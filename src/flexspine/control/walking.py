@@ -70,19 +70,28 @@ class Gait:
         return self.speed * min(1.0, steps / self.ramp)
 
 
-def diagonal_pairs(legs: Mapping[str, Leg]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The pairs of a trot: a hind leg and the fore leg of the other side.
+Pairs = tuple[tuple[str, ...], tuple[str, ...]]
 
-    Raises `ParameterError` unless two legs are at either hip.
-    """
+
+def hip_pairs(legs: Mapping[str, Leg]) -> Pairs:
+    """The hind pair and the fore pair. Raises `ParameterError` unless there are two of two."""
     hips = sorted({leg.hip for leg in legs.values()})
     at = [[name for name, leg in legs.items() if leg.hip == hip] for hip in hips]
     if [len(names) for names in at] != [2, 2]:
         raise ParameterError(
             f"legs per hip: {', '.join(str(len(names)) for names in at)}",
-            "a trot needs two legs at each of two hips",
+            "a quadruped gait needs two legs at each of two hips",
         )
     hind, fore = at
+    return tuple(hind), tuple(fore)
+
+
+def diagonal_pairs(legs: Mapping[str, Leg]) -> Pairs:
+    """The pairs of a trot: a hind leg and the fore leg of the other side.
+
+    Raises `ParameterError` unless two legs are at each of two hips.
+    """
+    hind, fore = hip_pairs(legs)
     return (hind[0], fore[1]), (hind[1], fore[0])
 
 
@@ -99,7 +108,7 @@ class Walk:
         return legs_of(self.robot)
 
     @cached_property
-    def pairs(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    def pairs(self) -> Pairs:
         """The legs that stand together, those of the first step first."""
         return diagonal_pairs(self.legs)
 

@@ -1,0 +1,119 @@
+"""Joints that springs draw after the feet of a central pattern generator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import sympy as sp
+
+from flexspine.control.clocked import Clocked
+from flexspine.control.cpg import Beat, Cpg
+from flexspine.control.laws import JointSprings
+from flexspine.control.references import ReferenceFunction, leg_numbers, references
+from flexspine.hybrid.compile import Array
+from flexspine.hybrid.outcome import Outcome
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.models.articulated import BoundRobot
+from flexspine.models.drive import Moment
+from flexspine.models.leg_geometry import Leg, legs_of
+
+AMPLITUDE, AMPLITUDE_RATE = sp.symbols("cpg_amplitude cpg_amplitude_rate", real=True)
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+@dataclass(frozen=True)
+class CpgDriven(Clocked):
+    """Step by the rhythm of oscillators, without sense of the ground."""
+
+    cpg: Cpg | None = None
+    springs: JointSprings = field(default_factory=JointSprings)
+
+    @property
+    def pattern(self) -> Cpg:
+        """The oscillators."""
+        assert self.cpg is not None
+        return self.cpg
+
+    @cached_property
+    def legs(self) -> dict[str, Leg]:
+        """The robot's legs."""
+        return legs_of(self.robot)
+
+    def held(self) -> tuple[sp.Symbol, ...]:
+        """The torques, the beat, and where joints are to be."""
+        return (*super().held(), *self._beat_symbols, *self._angles.values())
+
+    def observed(self) -> tuple[Mapping[sp.Symbol, sp.Expr], Mapping[str, sp.Expr]]:
+        """Where joints are to be."""
+        return {}, {f"reference_{joint}": symbol for joint, symbol in self._angles.items()}
+
+    def choose(self, moment: Moment) -> tuple[Array, Mapping[sp.Symbol, float]]:
+        """Draw joints to where the beat has them, and let it go on."""
+        beat = self._beat(moment.held)
+        angles, rates = self.joints(beat)
+        motors = self.robot.linkage.actuation.T
+        torques = self.springs.pull(angles - motors @ moment.q, rates - motors @ moment.rates)
+        following = self.pattern.advance(beat, moment.time, 1 / self.rate)
+        numbers = [*following.phases.tolist(), following.amplitude, following.amplitude_rate]
+        remembered = dict(zip(self._beat_symbols, numbers, strict=True))
+        return torques, remembered | dict(zip(self._angles.values(), angles.tolist(), strict=True))
+
+    def joints(self, beat: Beat) -> tuple[Array, Array]:
+        """Angles of the motors' joints and their rates at a beat, shape (m,)."""
+        place, velocity = self.pattern.feet(beat)
+        known = leg_numbers(self.legs)
+        for number, leg in enumerate(self.legs):
+            for axis in range(2):
+                hip = self.legs[leg].hip if axis == 0 else 0.0
+                known[_symbol(f"foot_{'xy'[axis]}_{leg}")] = float(place[number, axis]) + hip
+                known[_symbol(f"foot_{'xy'[axis]}_rate_{leg}")] = float(velocity[number, axis])
+        table, _ = self._reference_function(known)
+        return table[0], table[1]
+
+    def begin(self, bound: BoundRobot) -> HybridState | Outcome:
+        """The robot at rest on all its feet, which are below the hips."""
+        beat = self.pattern.begin()
+        numbers = [*beat.phases.tolist(), 0.0, 0.0]
+        held = dict.fromkeys(self.held(), 0.0) | dict(zip(self._beat_symbols, numbers, strict=True))
+        linkage, q = self.robot.linkage, np.zeros(self.robot.linkage.size)
+        angles, _ = self.joints(beat)
+        for joint, angle in zip(self._angles, angles, strict=True):
+            q[linkage.place[joint]] = angle
+        # Level the trunk, then put the feet down.
+        trunk = linkage.place[next(iter(self.legs.values())).trunk]
+        q[0] -= linkage.angles(q)[trunk]
+        leg = next(iter(self.legs.values()))
+        q[-2:] += np.array([leg.hip, 0.0]) - linkage.foot(q, leg.foot)
+        return bound.carry_on(self.ready(bound.stand(q, np.zeros_like(q), held)), bound.at_rest(q))
+
+    def _beat(self, held: Mapping[sp.Symbol, float]) -> Beat:
+        *phases, amplitude, rate = (held[symbol] for symbol in self._beat_symbols)
+        return Beat(np.array(phases), amplitude, rate)
+
+    @cached_property
+    def _beat_symbols(self) -> tuple[sp.Symbol, ...]:
+        phases = (_symbol(f"cpg_phase_{leg}") for leg in self.legs)
+        return (*phases, AMPLITUDE, AMPLITUDE_RATE)
+
+    @cached_property
+    def _angles(self) -> dict[str, sp.Symbol]:
+        return {joint: _symbol(f"held_reference_{joint}") for joint in self.held_torques}
+
+    @cached_property
+    def _reference_function(self) -> ReferenceFunction:
+        """Joints from feet, the middle of the trunk being the origin."""
+        still = (sp.zeros(2, 1), sp.zeros(2, 1), sp.zeros(2, 1))
+        feet, inputs = {}, list(leg_numbers(self.legs))
+        for leg in self.legs:
+            place = sp.Matrix([_symbol(f"foot_{axis}_{leg}") for axis in "xy"])
+            velocity = sp.Matrix([_symbol(f"foot_{axis}_rate_{leg}") for axis in "xy"])
+            feet[leg] = (place, velocity, sp.zeros(2, 1))
+            inputs += [*place, *velocity]
+        found = references(self.robot, self.legs, still, feet)
+        return ReferenceFunction(found, list(self.held_torques), inputs)
