@@ -48,15 +48,15 @@ def trot(
         str,
         typer.Option(
             help="tracking (computed torque of all joints), qp (the same within friction and "
-            "limits), com (centre of mass, pitch, swing legs; the spine moves) or pd (springs "
-            "and dampers at the joints)."
+            "limits), com (centre of mass, pitch, swing legs; the spine moves), pd (springs "
+            "and dampers at the joints) or cpg (the same, drawn after coupled oscillators)."
         ),
     ] = "tracking",
     rate: Annotated[
         float | None,
         typer.Option(
             help="Choose torques this often (Hz) and hold them; tracking and pd do without a rate, "
-            "qp and com take 400 Hz if none is given."
+            "qp and com take 400 Hz if none is given, cpg 1000 Hz."
         ),
     ] = None,
     limit: Annotated[

@@ -58,7 +58,7 @@ class ComputedTorque(Walker):
 
     def label(self, moment: Moment) -> str:
         """The feet that the law counts on, where they are not those that stick."""
-        footing, counted = moment.footing, self.counted(moment)
+        footing, counted = moment.footing, self.to_stand(moment.held)
         known = counted == footing.feet == footing.sticking
         return "" if known else Footing.sticking_on(counted).name
 
@@ -83,7 +83,7 @@ class ComputedTorque(Walker):
 
     def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
         """The torques, from where the law knows them."""
-        counted = Footing.sticking_on(self.counted(bound.moment(point))).name
+        counted = Footing.sticking_on(self.to_stand(bound.moment(point).held)).name
         found = bound.observe(counted, point.states[None], point.held)
         return np.array([found[f"torque_{joint}"][0] for joint in self.motors])
 

@@ -53,6 +53,15 @@ class CpgDriven(Clocked):
         """Where joints are to be."""
         return {}, {f"reference_{joint}": symbol for joint, symbol in self._angles.items()}
 
+    def to_stand(self, held: Mapping[sp.Symbol, float]) -> tuple[str, ...]:
+        """The feet of the legs that are in their stance."""
+        stands = self.pattern.in_stance(self._beat(held)).tolist()
+        return tuple(leg.foot for leg, down in zip(self.legs.values(), stands, strict=True) if down)
+
+    def steps(self, held: Mapping[sp.Symbol, float]) -> int:
+        """How many half cycles the first leg has done."""
+        return int(self._beat(held).phases[0] // np.pi)
+
     def choose(self, moment: Moment) -> tuple[Array, Mapping[sp.Symbol, float]]:
         """Draw joints to where the beat has them, and let it go on."""
         beat = self._beat(moment.held)

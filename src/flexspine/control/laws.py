@@ -206,7 +206,7 @@ class JointSprings(Law):
     """Joints drawn to their angles by springs and dampers, in N m/rad and N m s/rad."""
 
     stiffness: float = 300.0
-    damping: float = 5.0
+    damping: float = 4.0
     name = "pd"
 
     def torques(self, now: Situation) -> Array:

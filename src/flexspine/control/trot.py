@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import inf
 
+from flexspine.control.clocked import Clocked
 from flexspine.control.computed_torque import ComputedTorque, Gains
+from flexspine.control.cpg import Cpg, rhythm
+from flexspine.control.cpg_driven import CpgDriven
 from flexspine.control.joint_springs import SpringDriven
 from flexspine.control.laws import JointSprings, Law, LeastResidual, SevenOutputs, Tracking
 from flexspine.control.sampled import Sampled
-from flexspine.control.walking import Gait, Walker
+from flexspine.control.walking import Gait, Walker, diagonal_pairs
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.models.articulated import BoundRobot, Push
+from flexspine.models.leg_geometry import legs_of
 from flexspine.models.model import TOLERANCES, check_between
 from flexspine.models.robot import Robot
 from flexspine.models.robot_run import RobotRun
 from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
 
-CONTROLLERS: dict[str, type[Law]] = {
+LAWS: dict[str, type[Law]] = {
     law.name: law for law in (Tracking, LeastResidual, SevenOutputs, JointSprings)
 }
+OSCILLATORS = "cpg"
+CONTROLLERS = (*LAWS, OSCILLATORS)
 
-# Hz; that of the study's robot, for laws that have to be sampled.
-USUAL_RATE = 400.0
+# Hz, of controllers that have to be sampled. That of the study's robot; springs that are held for
+# as long shake the light shanks.
+USUAL_RATES = {LeastResidual.name: 400.0, SevenOutputs.name: 400.0, OSCILLATORS: 1000.0}
 
-# Controllers that also work without a clock.
-CONTINUOUS = ("tracking", "pd")
+# Of its cycle that a leg stands under oscillators; feet then overlap a little.
+DUTY = 0.55
 
 
 @dataclass(frozen=True)
@@ -37,8 +44,9 @@ class Trot:
 
     ``controller`` is one of `CONTROLLERS`: ``tracking`` (computed torque), ``qp`` (the same as
     nearly as contacts and limits allow), ``com`` (centre of mass, pitch and swing legs; the spine
-    moves) or ``pd`` (springs and dampers at the joints). ``rate`` in Hz is how often torques are
-    chosen, None: all the time, where the law allows it. ``limit`` bounds them. ``push`` is an
+    moves), ``pd`` (springs and dampers at the joints) or ``cpg`` (the same, drawn after coupled
+    oscillators that know nothing of the ground). ``rate`` in Hz is how often torques are chosen,
+    None: all the time, where the law allows it. ``limit`` bounds them. ``push`` is an
     impulse in N s along x on the body at ``push_time``.
     """
 
@@ -63,8 +71,8 @@ def trot(
     """Let a robot trot from standing.
 
     A run that falls is no error: look at ``outcome``. ``progress`` is told the share that is done,
-    0 to 1. Raises `ParameterError` and
-    `UnknownNameError` for what cannot be asked for, and for a robot that has no legs to trot on.
+    0 to 1. Raises `ParameterError` and `UnknownNameError` for what cannot be asked for, and for a
+    robot that has no legs to trot on.
     """
     asked = Trot() if wanted is None else wanted
     drive = driven(robot, asked)
@@ -78,7 +86,7 @@ def trot(
     start = drive.begin(bound)
     settings = {
         "controller": asked.controller,
-        "rate": drive.rate if isinstance(drive, Sampled) else None,
+        "rate": drive.rate if isinstance(drive, Clocked) else None,
         **{f"gait.{each.name}": getattr(asked.gait, each.name) for each in fields(Gait)},
         **{
             each.name: getattr(asked, each.name)
@@ -86,40 +94,65 @@ def trot(
             if each.name not in ("controller", "rate", "gait")
         },
     }
+    settings = {name: None if value == inf else value for name, value in settings.items()}
     if isinstance(start, Outcome):
         raise ParameterError(f"the robot cannot stand: {start.message}", start.advice)
     trajectory = integrate(bound, start, end_time=asked.seconds, record=True)
     return RobotRun(bound, trajectory, tolerance, settings)
 
 
-def driven(robot: Robot, asked: Trot) -> Walker:
+def driven(robot: Robot, asked: Trot) -> Walker | CpgDriven:
     """The drive that is asked for. Raises `ParameterError` and `UnknownNameError`."""
     if asked.controller not in CONTROLLERS:
         raise UnknownNameError("controller", asked.controller, CONTROLLERS)
     _check(asked)
+    _check_robot(robot, asked.gait)
     gains = {
         name: getattr(asked, name)
         for name in ("stiffness", "damping")
         if getattr(asked, name) is not None
     }
-    rate = asked.rate
-    if rate is None and asked.controller not in CONTINUOUS:
-        rate = USUAL_RATE
-    if rate is not None:
-        law = CONTROLLERS[asked.controller](**gains)
-        limit = inf if asked.limit is None else asked.limit
-        made: Walker = Sampled(robot, gait=asked.gait, law=law, rate=rate, limit=limit)
-    elif asked.limit is not None:
+    rate = USUAL_RATES.get(asked.controller) if asked.rate is None else asked.rate
+    limit = inf if asked.limit is None else asked.limit
+    if rate is None and asked.limit is not None:
         raise ParameterError(
             f"torques are limited to {asked.limit:g} N m, but not sampled",
             "limits work with a sample rate only; give one, such as 400 Hz",
         )
-    elif asked.controller == "pd":
+    made: Walker | CpgDriven
+    if asked.controller == OSCILLATORS:
+        assert rate is not None
+        springs, cpg = JointSprings(**gains), _oscillators(robot, asked.gait)
+        made = CpgDriven(robot, rate=rate, limit=limit, springs=springs, cpg=cpg)
+    elif rate is not None:
+        law = LAWS[asked.controller](**gains)
+        made = Sampled(robot, gait=asked.gait, law=law, rate=rate, limit=limit)
+    elif asked.controller == JointSprings.name:
         made = SpringDriven(robot, asked.gait, springs=JointSprings(**gains))
     else:
         made = ComputedTorque(robot, asked.gait, gains=Gains(**gains))
-    _check_standing(made)
+        if robot.linkage.size - len(made.motors) < 4:
+            raise ParameterError(
+                "tracking all joints is overdetermined on two feet, as no joint is without a motor",
+                "take the controller qp, com, pd or cpg",
+            )
     return made
+
+
+def _oscillators(robot: Robot, gait: Gait) -> Cpg:
+    """Oscillators that trot as the gait says."""
+    cycle = gait.stance / DUTY
+    return Cpg(
+        replace(
+            rhythm("trot", legs_of(robot)),
+            frequency=1 / cycle,
+            duty=DUTY,
+            stride=gait.speed * gait.stance,
+            height=gait.height,
+            clearance=gait.clearance,
+            stop=gait.stop,
+        )
+    )
 
 
 def _check(asked: Trot) -> None:
@@ -129,26 +162,23 @@ def _check(asked: Trot) -> None:
     for name in ("height", "stance", "clearance", "landing"):
         check_between(f"gait.{name}", getattr(gait, name), 0, 10)
     check_count("gait.ramp", gait.ramp)
+    if not gait.stop > 0:
+        raise ParameterError(f"gait.stop = {gait.stop} is not usable", "give seconds above zero")
     for name in ("rate", "limit", "stiffness", "damping"):
         if getattr(asked, name) is not None:
             check_between(name, getattr(asked, name), 0, 1e6)
     check_between("push", asked.push, -1e3, 1e3)
 
 
-def _check_standing(made: Walker) -> None:
+def _check_robot(robot: Robot, gait: Gait) -> None:
     """Raise `ParameterError` for a robot that is not made for this."""
-    legs = made.walk.legs
-    _ = made.walk.pairs
+    legs = legs_of(robot)
+    diagonal_pairs(legs)
     reach = min(leg.reach for leg in legs.values())
-    if made.gait.height >= reach:
+    if gait.height >= reach:
         raise ParameterError(
-            f"gait.height = {made.gait.height:g} m is beyond the legs' reach of {reach:g} m",
+            f"gait.height = {gait.height:g} m is beyond the legs' reach of {reach:g} m",
             "lower the hips",
-        )
-    if isinstance(made, ComputedTorque) and made.robot.linkage.size - len(made.motors) < 4:
-        raise ParameterError(
-            "tracking all joints is overdetermined on two feet, as no joint is without a motor",
-            "take the controller qp, com or pd",
         )
 
 

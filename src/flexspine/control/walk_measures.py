@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexspine.control.walking import STEP, Walker
 from flexspine.hybrid.compile import Array
 from flexspine.models.articulated import anchor
 from flexspine.models.robot_run import RobotRun, robot_dataset
@@ -98,19 +97,16 @@ def _range(values: Array) -> tuple[float, float]:
 
 def _plan(run: RobotRun, times: Array) -> tuple[Array, Array, Array]:
     """Which feet are to stand, where feet are anchored (both (times, feet)), and the steps done."""
-    walker, places = run.bound.drive, run.bound.system.places
-    assert isinstance(walker, Walker)
+    drive, system = run.bound.drive, run.bound.system
     feet = list(run.robot.feet)
     planned = np.zeros((len(times), len(feet)), dtype=bool)
     anchors = np.zeros(planned.shape)
     step = np.zeros(len(times))
-    where = [places[anchor(foot)[0]] for foot in feet]
+    where = [system.places[anchor(foot)[0]] for foot in feet]
     for arc, part in run.trajectory.pieces(times):
-        step[part] = arc.held[places[STEP]]
-        standing = {
-            walker.walk.legs[leg].foot for leg in walker.walk.standing({STEP: step[part][0]})
-        }
-        planned[part] = [foot in standing for foot in feet]
+        held = dict(zip(system.held, arc.held.tolist(), strict=True))
+        step[part] = drive.steps(held)
+        planned[part] = [foot in drive.to_stand(held) for foot in feet]
         anchors[part] = arc.held[where]
     return planned, anchors, step
 

@@ -55,7 +55,7 @@ class Gait:
 
     ``height`` is that of the hips, ``stance`` how long a pair of legs stands, ``clearance`` how
     high feet are lifted, ``landing`` how fast they come down, ``ramp`` the number of steps until
-    the ``speed`` is reached.
+    the ``speed`` is reached, and until the robot steps in place again from ``stop`` (s) on.
     """
 
     speed: float = 0.3
@@ -64,10 +64,13 @@ class Gait:
     clearance: float = 0.04
     landing: float = 0.05
     ramp: int = 4
+    stop: float = inf
 
-    def speed_after(self, steps: float) -> float:
-        """The speed that is wanted after so many steps."""
-        return self.speed * min(1.0, steps / self.ramp)
+    def speed_after(self, time: float, speed: float, steps: int) -> float:
+        """The speed that is wanted some steps after one at ``time`` (s) with ``speed``."""
+        aim = self.speed if time < self.stop else 0.0
+        most = steps * abs(self.speed) / self.ramp
+        return speed + min(max(aim - speed, -most), most)
 
 
 Pairs = tuple[tuple[str, ...], tuple[str, ...]]
@@ -169,7 +172,7 @@ class Walk:
         x = held[BODY.x] + held[BODY.speed] * since + held[BODY.gain] * since**2 / 2
         speed = held[BODY.speed] + held[BODY.gain] * since
         step = held[STEP] + 1
-        aims = gait.speed_after(step + 1), gait.speed_after(step + 2)
+        aims = [gait.speed_after(time, speed, steps) for steps in (1, 2)]
         gain = (aims[0] - speed) / gait.stance
         new = {**held, STEP: step, SWING_END: time + gait.stance, BODY.start: time}
         new |= {BODY.x: x, BODY.speed: speed, BODY.gain: gain}
@@ -268,7 +271,7 @@ class Walker(Drive):
             linkage=self.robot.linkage,
             q=moment.q,
             rates=moment.rates,
-            feet=(counted := self.counted(moment)),
+            feet=(counted := self.to_stand(moment.held)),
             regular=counted == moment.footing.feet == moment.footing.sticking,
             joints=joints,
             links={link: links[link] for leg in swinging for link in (leg.thigh, leg.shank)},
@@ -309,9 +312,13 @@ class Walker(Drive):
         held = self.walk.after_settling(moment)
         return moment if held is None else replace(moment, held=held)
 
-    def counted(self, moment: Moment) -> tuple[str, ...]:
-        """The feet that are to stand. A foot that bounces or slides for a moment still counts."""
-        return self._feet(self.walk.standing(moment.held))
+    def to_stand(self, held: Mapping[sp.Symbol, float]) -> tuple[str, ...]:
+        """The feet that are to stand. One that bounces or slides for a moment still counts."""
+        return self._feet(self.walk.standing(held))
+
+    def steps(self, held: Mapping[sp.Symbol, float]) -> int:
+        """How many pairs have landed."""
+        return int(held[STEP])
 
     def posture(self, held: Mapping[sp.Symbol, float]) -> Array:
         """``q`` as it is to be at the beginning."""

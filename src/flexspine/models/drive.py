@@ -88,6 +88,14 @@ class Drive:
         """When it changes its mind, or gives up, in any mode."""
         return ()
 
+    def to_stand(self, held: Mapping[sp.Symbol, float]) -> tuple[str, ...]:
+        """The feet that are to stand."""
+        return tuple(self.robot.feet)
+
+    def steps(self, held: Mapping[sp.Symbol, float]) -> int:
+        """How many steps it has done."""
+        return 0
+
     def ready(self, start: Moment) -> Moment:
         """What there is to do before the beginning."""
         return start
