@@ -40,8 +40,9 @@ STEP, SWING_END = sp.symbols("step swing_end", real=True)
 # Of the stretched leg; beyond this angles change without bounds.
 LONGEST = 0.999
 
-# s; guards have to be finite for events to be found.
-NEVER = 1e9
+# s; a time that has passed. One that never comes would be large, and the integrator takes errors
+# relative to the largest of all guards and states.
+PASSED = -1.0
 
 OUT_OF_REACH = OutcomeKind(
     "out_of_reach",
@@ -126,7 +127,7 @@ class Walk:
     def begin(self) -> dict[sp.Symbol, float]:
         """Stand with all feet below the hips, about to lift the first pair."""
         held = {BODY.x: 0.0, BODY.speed: 0.0, BODY.gain: 0.0, BODY.start: 0.0}
-        held |= {BODY.height: self.gait.height, STEP: -1.0, SWING_END: NEVER}
+        held |= {BODY.height: self.gait.height, STEP: -1.0, SWING_END: PASSED}
         for name, leg in self.legs.items():
             held |= _stand(name, leg.hip)
         return self._next_step(held, 0.0)
@@ -137,7 +138,7 @@ class Walk:
         swings = self.swinging(held)
         for name in swings:
             foot, path = self.legs[name].foot, FootPath.of(name)
-            early = held[path.stride] and time - held[path.start] < held[path.span] / 2
+            early = held[path.lift] and time - held[path.start] < held[path.span] / 2
             if foot in landed and not early:
                 held |= self._sink(name, held[anchor(foot)[0]], time)
         return held
@@ -159,7 +160,7 @@ class Walk:
             if not _sinks(name, held):
                 path = FootPath.of(name)
                 new |= self._sink(name, held[path.x] + held[path.stride], time)
-        return new | {SWING_END: NEVER}
+        return new | {SWING_END: PASSED}
 
     def _sink(self, leg: str, x: float, time: float) -> dict[sp.Symbol, float]:
         """The path of a foot that comes straight down."""

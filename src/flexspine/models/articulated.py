@@ -55,6 +55,9 @@ LEAST_BOUNCE = 1e-14
 # m/s; above the rounding errors of a foot that has just begun to slide.
 CREEP = 1e-12
 
+# m/s; a foot that slides no faster is at rest, and what it does next is up to the forces.
+AT_REST = 1e-9
+
 # m; feet at this height are on the ground when a run begins.
 GROUND = 1e-9
 
@@ -223,26 +226,39 @@ class BoundRobot(BoundSystem):
         if self.watch is not None:
             self.watch(moment.time)
         while moment.footing.feet:
-            feet = moment.footing.feet
-            torques = self.drive.torques_at(self, self.point(moment, states))
-            moving = [
-                None if does is Contact.STICK else does for _, does in moment.footing.contacts
-            ]
+            now = self._by_speed(moment)
+            feet = now.footing.feet
+            torques = self.drive.torques_at(self, self.point(now, states))
+            moving = [None if does is Contact.STICK else does for _, does in now.footing.contacts]
             found, accelerations = supported(
-                self.linkage, moment.q, moment.rates, feet, torques, self.robot.friction, moving
+                self.linkage, now.q, now.rates, feet, torques, self.robot.friction, moving
             )
             if found.verdict is Verdict.NONE:
-                return Outcome(NO_SOLUTION, f"{moment.footing.name} at t = {moment.time:.9g} s")
+                return Outcome(NO_SOLUTION, f"{now.footing.name} at t = {now.time:.9g} s")
             contacts = dict(zip(feet, found.contacts, strict=True))
-            after = replace(moment, footing=Footing.of(contacts, self.robot.feet))
+            after = replace(now, footing=Footing.of(contacts, self.robot.feet))
             lingering = self._lingering(after, accelerations)
             if lingering:
-                moment = self._settled(after, lingering)
+                down = touching(self, after, dict.fromkeys(lingering, Contact.SLIDE_FORWARD))
+                moment = self._held_still(down)
                 continue
             moment = self.drive.after_settling(after)
             if moment is after:
                 break
         return self.point(moment, states)
+
+    def _by_speed(self, moment: Moment) -> Moment:
+        """The moment with feet that slide the way they move; those at rest stick for now."""
+        contacts, rests = dict(moment.footing.contacts), False
+        for foot, does in moment.footing.contacts:
+            if does is not Contact.STICK:
+                row = self.linkage.foot_jacobian(moment.q, [foot])[0]
+                speed = float(row @ moment.rates)
+                contacts[foot] = Contact.SLIDE_FORWARD if speed > 0 else Contact.SLIDE_BACK
+                if abs(speed) <= AT_REST:
+                    contacts[foot], rests = Contact.STICK, True
+        after = replace(moment, footing=Footing.of(contacts, self.robot.feet))
+        return self._held_still(after) if rests else after
 
     def _lingering(self, moment: Moment, accelerations: Array) -> list[str]:
         """Feet in the air that would come back without having left."""
@@ -258,21 +274,17 @@ class BoundRobot(BoundSystem):
                     found.append(foot)
         return found
 
-    def _settled(self, moment: Moment, lingering: list[str]) -> Moment:
-        """The moment with more feet on the ground, their way up and down taken away."""
-        linkage, contacts = self.linkage, {}
-        for foot in lingering:
-            along = float(linkage.foot_jacobian(moment.q, [foot])[0] @ moment.rates)
-            forward = Contact.SLIDE_FORWARD if along > 0 else Contact.SLIDE_BACK
-            contacts[foot] = Contact.STICK if abs(along) <= CREEP else forward
-        after = touching(self, moment, contacts)
+    def _held_still(self, moment: Moment) -> Moment:
+        """The moment without what is left of feet moving that stick, or of any leaving the ground."""
         rows = [
             row
-            for foot, does in after.footing.contacts
-            for row in linkage.foot_jacobian(moment.q, [foot])[0 if does is Contact.STICK else 1 :]
+            for foot, does in moment.footing.contacts
+            for row in self.linkage.foot_jacobian(moment.q, [foot])[
+                (0 if does is Contact.STICK else 1) :
+            ]
         ]
-        rates = stopped(linkage, moment.q, moment.rates, np.array(rows))
-        return replace(after, rates=rates, held=self.lost(after, rates))
+        rates = stopped(self.linkage, moment.q, moment.rates, np.array(rows))
+        return replace(moment, rates=rates, held=self.lost(moment, rates))
 
     def lost(self, before: Moment, rates: Array) -> dict[sp.Symbol, float]:
         """What is held when rates have changed at once: the energy that is lost counts."""
