@@ -22,6 +22,10 @@ from flexspine.models.articulated import CLOCK
 from flexspine.models.leg_geometry import Leg
 from flexspine.models.robot import Robot
 
+# Of (1 - cos 2 pi s) / 2 (1 - s^2); its last factor takes away the upward acceleration at the end,
+# with which a foot that lands early would leave the ground again.
+HIGHEST = 0.7782717312270072
+
 # Angle, rate and acceleration.
 Motion = tuple[sp.Expr, sp.Expr, sp.Expr]
 
@@ -82,7 +86,8 @@ class FootPath:
         since = CLOCK - self.start
         share, turn = since / self.span, 2 * sp.pi / self.span
         x = self.x + self.stride * (share - sp.sin(turn * since) / (2 * sp.pi))
-        y = self.lift * (1 - sp.cos(turn * since)) / 2 - self.sink * since
+        y = self.lift * (1 - sp.cos(turn * since)) / 2 * (1 - share**2) / HIGHEST
+        y -= self.sink * since
         y += self.landing * self.span * share**2 * (1 - share)
         place = sp.Matrix([x, y])
         return place, place.diff(CLOCK), place.diff(CLOCK, 2)
