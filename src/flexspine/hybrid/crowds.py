@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexspine.hybrid.compile import Array, CompiledMode
-from flexspine.hybrid.integrate import CHATTER_EVENTS, CHATTER_WINDOW, RECENT_EVENTS, Firing
+from flexspine.hybrid.integrate import CHATTER_EVENTS, RECENT_EVENTS, Firing
 from flexspine.hybrid.step_events import Indices
 
 
 class Crowds:
-    """The recent firings of runs in some slots."""
+    """The recent firings of runs in some slots; those within ``window`` seconds count."""
 
-    def __init__(self, slots: int) -> None:
+    def __init__(self, slots: int, window: float) -> None:
+        self._window = window
         # One column a slot, written round and round; ``_next`` is the place of the next one.
         self._times = np.full((RECENT_EVENTS, slots), -np.inf)
         self._which = np.zeros((RECENT_EVENTS, slots), dtype=int)  # positions in ``_names``
@@ -38,7 +39,7 @@ class Crowds:
         self._which[place, slots] = guards + self._first[name]
         self._next[slots] = (place + 1) % RECENT_EVENTS
         earlier = self._times[place - (CHATTER_EVENTS - 2), slots]
-        crowded: NDArray[np.bool_] = times - earlier < CHATTER_WINDOW
+        crowded: NDArray[np.bool_] = times - earlier < self._window
         return crowded
 
     def of(self, slot: int) -> list[Firing]:

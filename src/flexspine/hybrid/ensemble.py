@@ -78,7 +78,7 @@ class _Pool:
         self.mode, self.run_of = np.full(size, NONE), np.zeros(size, dtype=int)
         self.time, self.since, self.longest = (np.zeros(size) for _ in range(3))
         self.round_of = np.zeros(size, dtype=int)
-        self.crowds = Crowds(size)
+        self.crowds = Crowds(size, system.chatter_window)
         self.soon = np.zeros(size, dtype=bool)  # an event is to be expected in the next step
         self.requires = [(system.places[s], v) for s, v in system.section.requires.items()]
         self.resets = [(system.places[s], v) for s, v in system.section.resets.items()]

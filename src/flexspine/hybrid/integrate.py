@@ -36,9 +36,8 @@ ZERO = 1e-12
 # event by more than SIMULTANEITY.
 GRAZING_RATE = 1e-4
 
-# One guard firing this often within this many seconds is chatter; no gait comes near it.
+# One guard firing this often within the system's window is chatter.
 CHATTER_EVENTS = 8
-CHATTER_WINDOW = 1e-2
 RECENT_EVENTS = 4 * CHATTER_EVENTS
 
 # s; the slowest strides take one or two.
@@ -347,14 +346,15 @@ class _Run:
 
     def _doubt(self, name: str, rate: float) -> OutcomeKind | None:
         """Tell a grazing or a chattering event from a proper one."""
+        window = self.bound.system.chatter_window
         grazing = -GRAZING_RATE < rate < GRAZING_RATE
         crowded = len(self.firings) >= CHATTER_EVENTS and (
-            self.time - self.firings[-CHATTER_EVENTS].time < CHATTER_WINDOW
+            self.time - self.firings[-CHATTER_EVENTS].time < window
         )
         if not (grazing or crowded):
             return None
         recent = self.firings[-RECENT_EVENTS:]
-        times = sum(name in f.names for f in recent if self.time - f.time < CHATTER_WINDOW)
+        times = sum(name in f.names for f in recent if self.time - f.time < window)
         if times >= (CHATTER_EVENTS // 2 if grazing else CHATTER_EVENTS):
             return CHATTERED
         return GRAZED if grazing else None

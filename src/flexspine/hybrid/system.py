@@ -119,7 +119,8 @@ class HybridSystem:
     run. ``mode`` builds the named mode when it is first needed. ``tracked`` names observables
     whose largest values are worth keeping of a run of which nothing else is kept. ``large``
     systems, of a thousand terms and more, are compiled as functions that call each other, which
-    takes seconds instead of minutes.
+    takes seconds instead of minutes. One guard firing again and again within ``chatter_window``
+    seconds is chatter.
     """
 
     name: str
@@ -132,6 +133,7 @@ class HybridSystem:
     reversal: Reversal | None = None
     tracked: tuple[str, ...] = ()
     large: bool = False
+    chatter_window: float = 1e-2  # no gait comes near it
 
     @cached_property
     def places(self) -> dict[sp.Symbol, int]:

@@ -61,6 +61,9 @@ AT_REST = 1e-9
 # m; feet at this height are on the ground when a run begins.
 GROUND = 1e-9
 
+# s; feet that land one after the other knock each other off the ground for microseconds.
+CHATTER_WINDOW = 1e-5
+
 # s; feet that land closer together than this land at once.
 TOGETHER = 1e-12
 
@@ -322,6 +325,7 @@ def articulated_system(build: Build) -> HybridSystem:
         mode=mode,
         section=Section((), {}, {}, {}, FELL),
         large=True,
+        chatter_window=CHATTER_WINDOW,
     )
 
 
