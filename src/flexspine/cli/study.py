@@ -69,6 +69,7 @@ def study(
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.studies.claims import verdicts
+    from flexspine.studies.robot_claims import robot_verdicts
     from flexspine.studies.spines import Setting, study_spines
 
     interruptible()
@@ -92,6 +93,8 @@ def study(
             result = study_spines(setting, store, partial(_show, progress))
             progress.begin("judging the claims")
             judged = verdicts(result)
+            progress.begin("judging the claims about the articulated robot")
+            judged += robot_verdicts()
             if directory is not None and store is not None:
                 with directory.stage(SAVED) as stage:
                     _write(stage, result, judged, progress)
@@ -198,6 +201,7 @@ def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
                 "verdict": verdict.verdict,
                 "finding": verdict.finding,
                 "numbers": dict(verdict.numbers),
+                "command": verdict.command or None,
                 "runs": [
                     {"mean_speed": gait.mean_speed, "gait": _file(name)}
                     for name, gait in verdict.runs.items()
@@ -247,6 +251,9 @@ def _markdown(setting: Setting, judged: list[Verdict]) -> str:
     for verdict in judged:
         lines += [f"## {verdict.number}. {verdict.claim[0].upper()}{verdict.claim[1:]}", ""]
         lines += [f"**{verdict.verdict}**: {verdict.finding}.", ""]
+        if verdict.command:
+            lines += [f"Repeated by `{verdict.command}`.", ""]
+            continue
         runs = ", ".join(f"`{_file(name)}`" for name in verdict.runs) or "none"
         lines += [f"Gaits quoted: {runs}; all are in `gaits.csv` and `stiffness.csv`.", ""]
     return "\n".join(lines)

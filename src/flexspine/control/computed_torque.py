@@ -75,7 +75,7 @@ class ComputedTorque(Walker):
         return Turning(
             torques=found.torques,
             definitions={**self.references.definitions, **found.definitions},
-            observables=self.reference_angles,
+            observables=self.observed_references,
             guards=tuple(guards),
             accelerations=found.accelerations if known else None,
             forces=found.forces if known else {},

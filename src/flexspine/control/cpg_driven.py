@@ -12,7 +12,7 @@ import sympy as sp
 from flexspine.control.clocked import Clocked
 from flexspine.control.cpg import Beat, Cpg
 from flexspine.control.laws import JointSprings
-from flexspine.control.references import ReferenceFunction, leg_numbers, references
+from flexspine.control.leg_function import LegFunction
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.trajectory import HybridState
@@ -76,30 +76,21 @@ class CpgDriven(Clocked):
     def joints(self, beat: Beat) -> tuple[Array, Array]:
         """Angles of the motors' joints and their rates at a beat, shape (m,)."""
         place, velocity = self.pattern.feet(beat)
-        known = leg_numbers(self.legs)
-        for number, leg in enumerate(self.legs):
-            for axis in range(2):
-                hip = self.legs[leg].hip if axis == 0 else 0.0
-                known[_symbol(f"foot_{'xy'[axis]}_{leg}")] = float(place[number, axis]) + hip
-                known[_symbol(f"foot_{'xy'[axis]}_rate_{leg}")] = float(velocity[number, axis])
-        table, _ = self._reference_function(known)
-        return table[0], table[1]
+        return self._function.joints(place + self._hips, velocity)
 
     def begin(self, bound: BoundRobot) -> HybridState | Outcome:
         """The robot at rest on all its feet, which are below the hips."""
         beat = self.pattern.begin()
         numbers = [*beat.phases.tolist(), 0.0, 0.0]
         held = dict.fromkeys(self.held(), 0.0) | dict(zip(self._beat_symbols, numbers, strict=True))
-        linkage, q = self.robot.linkage, np.zeros(self.robot.linkage.size)
-        angles, _ = self.joints(beat)
-        for joint, angle in zip(self._angles, angles, strict=True):
-            q[linkage.place[joint]] = angle
-        # Level the trunk, then put the feet down.
-        trunk = linkage.place[next(iter(self.legs.values())).trunk]
-        q[0] -= linkage.angles(q)[trunk]
-        leg = next(iter(self.legs.values()))
-        q[-2:] += np.array([leg.hip, 0.0]) - linkage.foot(q, leg.foot)
+        place, _ = self.pattern.feet(beat)
+        q = self._function.posture(place + self._hips)
         return bound.carry_on(self.ready(bound.stand(q, np.zeros_like(q), held)), bound.at_rest(q))
+
+    @cached_property
+    def _hips(self) -> Array:
+        """Where hips are, shape (legs, 2)."""
+        return np.array([[leg.hip, 0.0] for leg in self.legs.values()])
 
     def _beat(self, held: Mapping[sp.Symbol, float]) -> Beat:
         *phases, amplitude, rate = (held[symbol] for symbol in self._beat_symbols)
@@ -115,14 +106,5 @@ class CpgDriven(Clocked):
         return {joint: _symbol(f"held_reference_{joint}") for joint in self.held_torques}
 
     @cached_property
-    def _reference_function(self) -> ReferenceFunction:
-        """Joints from feet, the middle of the trunk being the origin."""
-        still = (sp.zeros(2, 1), sp.zeros(2, 1), sp.zeros(2, 1))
-        feet, inputs = {}, list(leg_numbers(self.legs))
-        for leg in self.legs:
-            place = sp.Matrix([_symbol(f"foot_{axis}_{leg}") for axis in "xy"])
-            velocity = sp.Matrix([_symbol(f"foot_{axis}_rate_{leg}") for axis in "xy"])
-            feet[leg] = (place, velocity, sp.zeros(2, 1))
-            inputs += [*place, *velocity]
-        found = references(self.robot, self.legs, still, feet)
-        return ReferenceFunction(found, list(self.held_torques), inputs)
+    def _function(self) -> LegFunction:
+        return LegFunction(self.robot, self.legs)

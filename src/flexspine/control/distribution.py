@@ -97,6 +97,26 @@ class ForceFamily:
             return Distribution(Verdict.NOT_STANDING, self.dimension)
         return self._made(Verdict.FAMILY, friction, best)
 
+    def normal_range(self, foot: int, friction: float) -> tuple[float, float] | None:
+        """Within what torques can shift the normal force on a foot, by its place in the list.
+
+        In N, while no foot pulls or slips; None if that is not to be had.
+        """
+        slopes, offsets = self._cones(friction)
+        row = self.motors + 2 * foot + 1
+        if not self.dimension:
+            alone = float(self.first[row])
+            return (alone, alone) if self.exists and offsets.min() >= 0 else None
+        found = []
+        for sign in (1.0, -1.0):
+            solved = linprog(
+                sign * self.directions[row], A_ub=-slopes, b_ub=offsets, bounds=(None, None)
+            )
+            if not (self.exists and solved.success):
+                return None
+            found.append(float(self.first[row] + self.directions[row] @ solved.x))
+        return found[0], found[1]
+
     def _best(self, aim: Aim, friction: float, split: Sequence[float] | None) -> Array | None:
         """The numbers to choose, None if no foot may pull or slip in any way."""
         slopes, offsets = self._cones(friction)

@@ -35,7 +35,7 @@ class SpringDriven(Walker):
             + DAMPING * (rate - motion.bend_rate(joint))
             for joint, (angle, rate, _) in self.references.joints.items()
         }
-        return Turning(torques, self.references.definitions, self.reference_angles)
+        return Turning(torques, self.references.definitions, self.observed_references)
 
     def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
         """The same in numbers."""

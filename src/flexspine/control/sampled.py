@@ -22,7 +22,7 @@ class Sampled(Clocked, Walker):
 
     def observed(self) -> tuple[Mapping[sp.Symbol, sp.Expr], Mapping[str, sp.Expr]]:
         """Where joints are to be."""
-        return self.references.definitions, self.reference_angles
+        return self.references.definitions, self.observed_references
 
     def choose(self, moment: Moment) -> tuple[Array, Mapping[sp.Symbol, float]]:
         """What the law wants."""

@@ -16,6 +16,7 @@ import numpy as np
 import sympy as sp
 
 from flexspine.control.laws import Situation
+from flexspine.control.leg_function import standing
 from flexspine.control.references import (
     BODY,
     FootPath,
@@ -283,9 +284,12 @@ class Walker(Drive):
         )
 
     @cached_property
-    def reference_angles(self) -> dict[str, sp.Expr]:
-        """Where joints are to be, by the name that it is observed under."""
-        return {f"reference_{j}": angle for j, (angle, _, _) in self.references.joints.items()}
+    def observed_references(self) -> dict[str, sp.Expr]:
+        """Where joints are to be and how fast, by the names that these are observed under."""
+        joints = self.references.joints.items()
+        return {f"reference_{joint}": angle for joint, (angle, _, _) in joints} | {
+            f"reference_rate_{joint}": rate for joint, (_, rate, _) in joints
+        }
 
     def held(self) -> tuple[sp.Symbol, ...]:
         """The plan's numbers."""
@@ -323,15 +327,8 @@ class Walker(Drive):
 
     def posture(self, held: Mapping[sp.Symbol, float]) -> Array:
         """``q`` as it is to be at the beginning."""
-        linkage, q = self.robot.linkage, np.zeros(self.robot.linkage.size)
-        known = {**held, **self._measures, CLOCK: 0.0}
-        for link, (angle, _, _) in self._reference_function(known)[1].items():
-            q[linkage.place[link]] = angle
-        q = linkage.to_relative @ q
-        leg, parts = next(iter(self.walk.legs.items()))
-        path = FootPath.of(leg)
-        q[-2:] = np.array([held[path.x], 0.0]) - linkage.foot(q, parts.foot)
-        return q
+        ahead = {name: held[FootPath.of(name).x] - leg.hip for name, leg in self.walk.legs.items()}
+        return standing(self.robot, self.gait.height, ahead)
 
     def begin(self, bound: BoundRobot) -> HybridState | Outcome:
         """The robot at rest on all its feet, about to take the first step."""

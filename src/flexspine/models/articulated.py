@@ -278,7 +278,7 @@ class BoundRobot(BoundSystem):
         return found
 
     def _held_still(self, moment: Moment) -> Moment:
-        """The moment without what is left of feet moving that stick, or of any leaving the ground."""
+        """The moment with feet that stick at rest, and none that leaves the ground."""
         rows = [
             row
             for foot, does in moment.footing.contacts

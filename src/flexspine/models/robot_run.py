@@ -38,6 +38,7 @@ ROBOT_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "angle": (("time", "joint"), "rad", "relative angle of a joint"),
     "angle_rate": (("time", "joint"), "rad/s", "rate of a joint's relative angle"),
     "reference": (("time", "motor"), "rad", "angle that a motor's joint is to have"),
+    "reference_rate": (("time", "motor"), "rad/s", "rate that a motor's joint is to have"),
     "torque": (("time", "motor"), "N m", "torque of a motor"),
     "link_angle": (("time", "link"), "rad", "angle of a link from +x"),
     "link_start": (("time", "link", "axis"), "m", "where a link starts"),
@@ -174,8 +175,9 @@ def _sample(run: RobotRun, times: Array) -> dict[str, Any]:
         "impact_loss": held[:, system.places[LOSS]],
         "footing": np.array([_footing_name(row) for row in _rows(flags)], dtype=object),
     }
-    if any(name.startswith("reference_") for name in seen):
-        found["reference"] = _table(seen, "reference", motors, count)
+    for kind in ("reference", "reference_rate"):
+        if all(f"{kind}_{joint}" in seen for joint in motors):
+            found[kind] = _table(seen, kind, motors, count)
     trunk = sorted({linkage.place[leg.trunk] for leg in robot.legs.values()})
     if trunk:
         found["trunk_pitch"] = found["link_angle"][:, trunk].mean(axis=1)

@@ -16,7 +16,7 @@ class Verdict:
     """``verdict`` is ``holds``, ``fails``, ``depends on``, or ``undecided`` without evidence.
 
     ``finding`` says it in words with the numbers; ``numbers`` are these for machines, ``runs`` the
-    gaits that are quoted, by name.
+    gaits that are quoted, by name, and ``command`` what repeats the runs of those that quote none.
     """
 
     number: int
@@ -25,6 +25,7 @@ class Verdict:
     finding: str
     numbers: Mapping[str, Any] = field(default_factory=dict)
     runs: Mapping[str, Gait] = field(default_factory=dict)
+    command: str = ""
 
 
 def decided(for_it: list[bool], against_it: list[bool]) -> str:
