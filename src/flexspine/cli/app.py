@@ -18,6 +18,7 @@ from flexspine.cli import (
     branch,
     cache,
     equations,
+    forces,
     gait,
     gait_map,
     presets,
@@ -59,6 +60,7 @@ app.command("rerun")(sweep.rerun)
 app.command("basin")(basin.basin)
 app.command("map")(gait_map.gait_map)
 app.command("trot")(trot.trot)
+app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
 app.add_typer(verify.app, name="verify")

@@ -114,7 +114,8 @@ class ForceFamily:
             )
             if not (self.exists and solved.success):
                 return None
-            found.append(float(self.first[row] + self.directions[row] @ solved.x))
+            force = float(self.first[row] + self.directions[row] @ solved.x)
+            found.append(max(force, 0.0))  # what is below is rounding
         return found[0], found[1]
 
     def _best(self, aim: Aim, friction: float, split: Sequence[float] | None) -> Array | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from flexspine.control.computed_torque import Gains
@@ -84,13 +86,10 @@ def _tracking(robot: Robot) -> Verdict:
 
 def _off_exponential(run: RobotRun, gains: Gains) -> tuple[float, float, int]:
     """How far errors are off their exponentials, how large they get, in rad, in how many phases."""
-    starts = [event.time for event in run.events if event.names[0].endswith("touchdown")]
-    ends = [event.time for event in run.events]
     off, largest, phases = 0.0, 0.0, 0
-    for start in starts:
-        end = min((time for time in ends if time > start + SHORTEST), default=None)
-        if end is None or any(start < time < end for time in ends):
-            continue  # disturbed, or not over
+    for start, end in pairwise(event.time for event in run.events):
+        if end - start < SHORTEST:
+            continue
         times = np.linspace(start, end, 102)[:-1]
         found = robot_dataset(run, times=times)
         motors = found["motor"].values
@@ -120,7 +119,6 @@ def _shifting(robot: Robot) -> Verdict:
         family = force_family(robot.linkage, q, feet)
         reach = family.normal_range(0, robot.friction)
         assert reach is not None
-        reach = reach[0] + 0.0 if abs(reach[0]) > SHIFTED else 0.0, reach[1]
         shifts.append(reach[1] - reach[0] > SHIFTED)
         kind = "one way only" if not family.dimension else f"a family of {family.dimension}"
         told.append(
