@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from flexspine import Robot, load_robot
+from flexspine.hybrid.integrate import integrate
+from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.trajectory import Event, Trajectory
 from flexspine.mechanics.complementarity import Contact
 from flexspine.models.articulated import (
@@ -27,7 +29,7 @@ from flexspine.models.articulated import (
 from flexspine.models.drive import Drive
 from flexspine.models.footing import Footing
 from tests.robot_by_scipy import Falling, Happening
-from tests.robots import Steady, above_ground, dropped, fallen_from
+from tests.robots import TOLERANCE, Steady, above_ground, dropped, fallen_from
 
 Array = NDArray[np.float64]
 
@@ -439,6 +441,8 @@ def test_without_sliding_it_ends_where_contact_has_no_single_solution() -> None:
     robot = robot_of(0.8)
     linkage, rng = robot.linkage, np.random.default_rng(8)
     names = {0: "no_contact_solution", 1: "completed"}
+    bound = BoundRobot(Drive(robot), TOLERANCE, slides=False)
+    other = Falling(robot)
     seen: dict[str, int] = {}
     while sum(seen.values()) < 30 or len(seen) < 3:
         posture = on_two_toes(robot, rng)
@@ -451,11 +455,12 @@ def test_without_sliding_it_ends_where_contact_has_no_single_solution() -> None:
         jacobian = linkage.foot_jacobian(q, feet)
         held = jacobian[[0, 1, 3]]
         rates -= np.linalg.pinv(held) @ (held @ rates - [0.0, 0.0, -10.0])
-        other = Falling(robot)
         if other.next(q, rates, feet[:1])[1] != {feet[0]: 0}:
             continue  # it would lift off or slide
         wanted = names.get(solutions(robot, q, rates, feet), "ambiguous_contact")
-        _, run = fallen_from(Drive(robot), q, rates, 1.2e-7, slides=False)
+        start = bound.carry_on(bound.stand(q, rates, {}), bound.at_rest(q))
+        assert not isinstance(start, Outcome)
+        run = integrate(bound, start, end_time=1.2e-7, record=True)
         assert run.outcome.name == wanted
         if wanted != "completed":
             assert run.end.time == pytest.approx(1e-7, rel=1e-3)
