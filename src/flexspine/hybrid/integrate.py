@@ -242,7 +242,8 @@ class _Run:
         found = guard.decide(self.bound, self._here())
         if found is None:
             return False
-        self.instant, self.fired = self.time, [guard.name]
+        earlier = self.fired if self.time - self.instant <= SIMULTANEITY else []
+        self.instant, self.fired = self.time, [*earlier, guard.name]
         if self._in_doubt(guard, -inf):
             return True
         if isinstance(found, Outcome):
