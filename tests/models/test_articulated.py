@@ -399,6 +399,35 @@ def test_a_rod_comes_to_rest_after_rocking(rod: Robot) -> None:
     assert lost == pytest.approx(MASS * GRAVITY * COM * np.sin(0.3), rel=1e-10)
 
 
+def test_a_push_in_flight_throws_the_robot() -> None:
+    """Its centre of mass goes on along another parabola; all that is lost is what the push adds."""
+    robot, push = robot_of(0.8), Push(0.05, (3.0, -1.0), "fore_trunk")
+    bound, run = dropped(Drive(robot), 0.09, push=push)
+    (event,) = run.events
+    assert (event.names, event.time) == (("push",), pytest.approx(0.05, abs=1e-15))
+    q, rates = split(bound, run.end.states)
+    mass = robot.linkage.mass
+    speed = bound.linkage.com_jacobian(q) @ rates
+    expected = [1.0 + 3.0 / mass, -9.81 * 0.09 - 1.0 / mass]
+    assert speed == pytest.approx(expected, abs=1e-12)
+    kinetic = []
+    for state in (before(run, event), event.after.states):
+        kinetic.append(bound.linkage.kinetic_energy(*split(bound, state)))
+    added = kinetic[1] - kinetic[0]
+    assert -event.after.held[bound.system.places[LOSS]] == pytest.approx(added, rel=1e-12)
+    assert added > 0
+
+
+def test_a_rod_that_lies_on_more_than_its_feet_has_fallen(rod: Robot) -> None:
+    """Its end comes down with its feet."""
+    longer = rod.with_values({"fore.at": 0.7})
+    for height in (0.1, 0.05, 0.0371):
+        _, run = fallen_from(Drive(longer), np.array([0.0, 0.0, height]), np.zeros(3), 1.0)
+        assert run.outcome.name == "fell"
+        assert run.outcome.message.startswith("rod at the ground")
+        assert run.end.time == pytest.approx(np.sqrt(2 * height / GRAVITY), abs=1e-12)
+
+
 def solutions(robot: Robot, q: Array, rates: Array, feet: list[str]) -> int:
     """How many ways there are for feet to stick or let go at an impact."""
     other, found = Falling(robot), []
