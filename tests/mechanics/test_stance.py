@@ -8,9 +8,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import null_space
+from scipy.optimize import nnls
 
 from flexspine import load_robot
-from flexspine.mechanics.stance import constrained, tracked
+from flexspine.mechanics.complementarity import Contact, Verdict
+from flexspine.mechanics.stance import constrained, stopped, supported, tracked
+from tests.mechanics.test_linkage import Engine
 
 Array = NDArray[np.float64]
 
@@ -113,3 +117,147 @@ def test_it_is_singular_where_toes_and_spine_are_in_line() -> None:
         across, up = fore - hind, spine - hind
         area = abs(across[0] * up[1] - across[1] * up[0])
         assert abs(np.linalg.det(jacobian)) == pytest.approx(area, abs=1e-13)
+
+
+ENGINE = Engine(ROBOT)
+
+
+def at_rest(rates: Array, rows: Array) -> Array:
+    """The rates without what these rows move."""
+    return rates - np.linalg.pinv(rows) @ (rows @ rates)
+
+
+def free(q: Array, rates: Array, torques: Array) -> tuple[Array, Array]:
+    """The mass matrix and the accelerations without any ground."""
+    spine = ROBOT.place["spine"]
+    applied = -ENGINE.forces(q, rates)
+    applied[spine] -= 240.0 * (q[spine] + 0.05) + 2.0 * rates[spine]
+    motors = [joint.name for joint in ROBOT.joints if joint.actuated]
+    applied[[ROBOT.place[name] for name in motors]] += torques
+    inertia = ENGINE.mass_matrix(q)
+    return inertia, np.linalg.solve(inertia, applied)
+
+
+def standing(
+    count: int, seed: int
+) -> Iterator[tuple[Array, Array, Array, list[str], Array, Array]]:
+    """Random states with one to four feet at rest: q, rates, torques, feet, J and J' q'."""
+    rng = np.random.default_rng(seed)
+    for q, rates, torques in states(count, seed):
+        feet = sorted(rng.permutation(TOES)[: rng.integers(1, 5)].tolist())
+        jacobian = np.vstack([ENGINE.foot(foot, q, rates)[1] for foot in feet])
+        slow = at_rest(rates, jacobian)
+        bias = np.concatenate([ENGINE.foot(foot, q, slow)[2] for foot in feet])
+        yield q, slow, torques, feet, jacobian, bias
+
+
+def test_on_ice_the_body_strays_least_from_where_it_would_fall() -> None:
+    """Gauss: of accelerations by which no foot sinks, those nearest to the free ones.
+
+    The distance is measured by the mass matrix; its dual are least squares with forces that push.
+    """
+    lifted = 0
+    for q, rates, torques, feet, jacobian, bias in standing(300, 6):
+        moving = [None] * len(feet)
+        found, accelerations = supported(ROBOT, q, rates, feet, torques, 0.0, moving)
+        inertia, alone = free(q, rates, torques)
+        rows = jacobian[1::2]
+        root = np.linalg.cholesky(inertia)
+        spread = np.linalg.solve(root, rows.T)
+        sinking = rows @ alone + bias[1::2]
+        # |spread f + c|^2 with spread' c = sinking is the dual's.
+        centre = spread @ np.linalg.solve(spread.T @ spread, sinking)
+        forces, _ = nnls(spread, -centre)
+        expected = alone + np.linalg.solve(inertia, rows.T @ forces)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(accelerations, expected, rtol=0, atol=1e-9 * size)
+        most = np.abs(forces).max(initial=1.0)
+        np.testing.assert_allclose(found.pushes[:, 1], forces, rtol=0, atol=1e-9 * most)
+        assert np.abs(found.pushes[:, 0]).max() <= 1e-12 * most
+        lifted += sum(does is Contact.OPEN for does in found.contacts)
+    assert lifted > 50
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.8])
+def test_feet_at_rest_stay_slip_or_lift_off_as_forces_allow(friction: float) -> None:
+    """Newton, Signorini and Coulomb, by accelerations."""
+    seen = dict.fromkeys(Contact, 0)
+    for q, rates, torques, feet, jacobian, bias in standing(500, 7):
+        moving = [None] * len(feet)
+        found, accelerations = supported(ROBOT, q, rates, feet, torques, friction, moving)
+        assert found.verdict is not Verdict.NONE
+        inertia, alone = free(q, rates, torques)
+        size = np.abs(accelerations).max()
+        gained = inertia @ (accelerations - alone)
+        most = np.abs(found.pushes).max(initial=1.0)
+        np.testing.assert_allclose(gained, jacobian.T @ found.pushes.ravel(), atol=1e-9 * most)
+        moves = (jacobian @ accelerations + bias).reshape(-1, 2)
+        for does, (tangent, normal), (along, up) in zip(
+            found.contacts, found.pushes, moves, strict=True
+        ):
+            seen[does] += 1
+            assert normal >= -1e-9 * most
+            assert up >= -1e-9 * size
+            assert abs(normal * up) <= 1e-9 * most * size
+            assert abs(tangent) <= friction * normal + 1e-9 * most
+            if does is Contact.STICK:
+                assert abs(along) <= 1e-9 * size
+            elif does is not Contact.OPEN:
+                way = 1 if does is Contact.SLIDE_FORWARD else -1
+                assert way * along >= -1e-9 * size
+                assert tangent == pytest.approx(-way * friction * normal, abs=1e-9 * most)
+    assert min(seen.values()) > 30
+
+
+def test_feet_that_slide_keep_the_direction_of_their_friction() -> None:
+    """Whatever way they accelerate; the others are at rest."""
+    rng = np.random.default_rng(8)
+    braked = kept = 0
+    for q, rates, torques in states(500, 8):
+        feet = sorted(rng.permutation(TOES)[:2].tolist())
+        jacobian = np.vstack([ENGINE.foot(foot, q, rates)[1] for foot in feet])
+        slow = at_rest(rates, jacobian[1:])  # the first slides, and neither rises
+        bias = np.concatenate([ENGINE.foot(foot, q, slow)[2] for foot in feet])
+        way = 1 if jacobian[0] @ slow > 0 else -1
+        moving = Contact.SLIDE_FORWARD if way > 0 else Contact.SLIDE_BACK
+        found, accelerations = supported(ROBOT, q, slow, feet, torques, 0.3, [moving, None])
+        assert found.verdict is not Verdict.NONE
+        assert found.contacts[0] in (moving, Contact.OPEN)
+        inertia, alone = free(q, slow, torques)
+        most = np.abs(found.pushes).max(initial=1.0)
+        gained = inertia @ (accelerations - alone)
+        np.testing.assert_allclose(gained, jacobian.T @ found.pushes.ravel(), atol=1e-9 * most)
+        tangent, normal = found.pushes[0]
+        assert tangent == pytest.approx(-way * 0.3 * normal, abs=1e-9 * most)
+        moves = (jacobian @ accelerations + bias).reshape(-1, 2)
+        assert moves[:, 1].min() >= -1e-9 * np.abs(accelerations).max()
+        if found.contacts[0] is moving:
+            assert normal >= 0
+            assert abs(moves[0, 1]) <= 1e-9 * np.abs(accelerations).max()
+            braked += way * moves[0, 0] < 0
+            kept += way * moves[0, 0] > 0
+    assert braked > 50
+    assert kept > 50
+
+
+def test_what_is_stopped_changes_the_motion_least() -> None:
+    """What is left moves freely on: the change has no momentum along any of it."""
+    rng = np.random.default_rng(9)
+    for q, rates, _ in states(100, 9):
+        feet = rng.permutation(TOES)[: rng.integers(1, 5)].tolist()
+        rows = np.vstack([ENGINE.foot(foot, q, rates)[1] for foot in feet])
+        rows = rows[rng.random(len(rows)) < 0.7]
+        if not len(rows):
+            continue
+        again = np.vstack([rows, rows[:1]])  # what is named twice is stopped once
+        inertia = ENGINE.mass_matrix(q)
+        for named in (rows, again):
+            after = stopped(ROBOT, q, rates, named)
+            size = np.abs(rates).max()
+            assert np.abs(rows @ after).max() <= 1e-10 * size
+            change = inertia @ (after - rates)
+            assert (
+                np.abs(null_space(rows).T @ change).max() <= 1e-10 * np.abs(inertia @ rates).max()
+            )
+            lost = (rates @ inertia @ rates - after @ inertia @ after) / 2
+            assert lost == pytest.approx((after - rates) @ change / 2, abs=1e-10)

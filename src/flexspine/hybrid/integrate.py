@@ -241,7 +241,8 @@ class _Run:
         found = guard.decide(self.bound, self._here())
         if found is None:
             return False
-        self.instant, self.fired = self.time, [guard.name]
+        earlier = self.fired if self.time - self.instant <= SIMULTANEITY else []
+        self.instant, self.fired = self.time, [*earlier, guard.name]
         if self._in_doubt(guard, -inf):
             return True
         if isinstance(found, Outcome):
@@ -286,11 +287,11 @@ class _Run:
                 return
             mode = self.bound.mode(self.mode)
             values = mode.evaluate(self.states, self.held)
-            jump = mode.code.jumps[due]
+            jump = mode.code.by_name[due]
             self.fired.append(jump.guard.name)
 
-    def _due(self, pairs: Array, candidates: tuple[Due, ...]) -> int | None:
-        """Return the index of a guard that fires at this instant too; pairs: value, rate, ..."""
+    def _due(self, pairs: Array, candidates: tuple[Due, ...]) -> str | None:
+        """Return the name of a guard that fires at this instant too; pairs: value, rate, ..."""
         numbers = pairs.tolist()
         for index, name, was_active, by_level in candidates:
             value = numbers[2 * index]
@@ -303,7 +304,7 @@ class _Run:
             else:
                 fires = was_active and falls_now and value >= rate * SIMULTANEITY
             if fires and name not in self.fired:
-                return index
+                return name
         return None
 
     def _start(self) -> None:
@@ -326,7 +327,7 @@ class _Run:
             self.instant, self.fired = self.time, []
         due = self._due(values[mode.code.guards], mode.code.due_here)
         if due is not None:
-            jump, before = mode.code.jumps[due], self.mode
+            jump, before = mode.code.by_name[due], self.mode
             known = len(self.fired)
             self.fired.append(jump.guard.name)
             self._fire(jump, values)

@@ -78,7 +78,7 @@ def resolve(
     combinations = whole if count else whole[:1]
     pushes = _solve(combinations, response, before, friction or 0.0)
     after = before + pushes @ response.T
-    slides_already = np.array([each is not None for each in moving or (None,) * feet])
+    slides_already = np.array([each is not None for each in moving or (None,) * feet], dtype=bool)
     holds = _holds(combinations, pushes, after, before, friction, slides_already)
     distinct: list[int] = []
     for number in np.flatnonzero(holds).tolist():
@@ -149,8 +149,8 @@ def _holds(
     """Where a combination is what it says, its equations included."""
     tangent, normal = pushes[:, ::2], pushes[:, 1::2]
     speed, rise = after[:, ::2], after[:, 1::2]
-    least = ZERO * np.abs(pushes).max(axis=1, keepdims=True)
-    still = ZERO * np.abs(before).max()
+    least = ZERO * np.abs(pushes).max(axis=1, keepdims=True, initial=0.0)
+    still = ZERO * np.abs(before).max(initial=0.0)
     grips = np.ones(normal.shape, dtype=bool)
     if friction is not None:
         grips = np.abs(tangent) <= friction * normal + least
