@@ -173,12 +173,7 @@ def counted(place: int) -> Decision:
     return count
 
 
-LOST_AFTER_PLAIN = pytest.mark.xfail(
-    strict=True, reason="a decided guard that is due right after a plain one at its instant is lost"
-)
-
-
-@pytest.mark.parametrize("decided_first", [pytest.param(False, marks=LOST_AFTER_PLAIN), True])
+@pytest.mark.parametrize("decided_first", [False, True])
 @pytest.mark.parametrize("record", [False, True])
 def test_a_decided_guard_and_a_plain_one_at_one_instant_both_fire_once(
     decided_first: bool, record: bool
@@ -223,11 +218,6 @@ def test_what_strikes_at_the_tick_of_a_clock_strikes_no_more_than_once(
         assert run.end.states[1] == pytest.approx(strikes - 9.81 * 0.0999, abs=1e-12)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="of two decided guards at one instant, the second is lost if rounding puts the first "
-    "one's instant after it",
-)
 @pytest.mark.parametrize("order", [1, -1])
 def test_what_strikes_at_the_tick_of_a_clock_does_not_stop_it(order: int) -> None:
     """Rounding may put either first."""

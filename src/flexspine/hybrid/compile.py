@@ -43,7 +43,7 @@ class Jump:
     A guard that does not act is a mere marker, such as a section may use.
     ``value`` and ``rate`` are the guard itself; ``states`` and ``held`` the point after the jump,
     ``guards`` the guards of the target mode there, value and rate in turn, of which ``due`` may
-    fire at the same instant. Guards that are decided in numbers have none of this.
+    fire at the same instant. Where a guard that is decided in numbers leads is not known before.
     """
 
     guard: Guard
@@ -81,6 +81,12 @@ class CompiledMode:
         self.guards = slice(0, 2 * len(_in_kernel(mode)))
         self.by_name = {jump.guard.name: jump for jump in jumps}
         self.due_here = _due(mode, mode)
+        decided = {guard.name for guard in mode.guards if guard.decide is not None}
+        self.decided_here = tuple(
+            Due(i, guard.name, True, guard.arming is Arming.LEVEL)
+            for i, guard in enumerate(_in_kernel(mode))
+            if guard.name in decided
+        )
         self.n_inputs, self.n_answers = kernel.nparams, kernel.nouts
         self.state: Array = integrator.state
         self.numbers: Array = integrator.pars
@@ -236,7 +242,7 @@ def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool
 
 def _in_kernel(mode: Mode) -> list[Guard]:
     """The guards that the event kernel answers for."""
-    return [guard for guard in mode.guards if guard.decide is None]
+    return [guard for guard in mode.guards if not guard.costly]
 
 
 def _due(mode: Mode, before: Mode) -> tuple[Due, ...]:

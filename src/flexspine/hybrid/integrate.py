@@ -20,7 +20,7 @@ from flexspine.hybrid.outcome import (
     Outcome,
     OutcomeKind,
 )
-from flexspine.hybrid.system import Guard, Section
+from flexspine.hybrid.system import Decision, Guard, Section
 from flexspine.hybrid.trajectory import Arc, Event, HybridState, Trajectory
 
 # s; guards that fire closer together than this are one event.
@@ -221,7 +221,7 @@ class _Run:
         if not (crossed or jump.acts):
             return False
         if guard.decide is not None:
-            return self._decide(guard)
+            return self._decide(guard, guard.decide)
         self.instant, self.fired = self.time, [guard.name]
         before = self.mode
         if jump.acts:
@@ -233,12 +233,12 @@ class _Run:
         if crossed:
             self._cross()
         self._note(tuple(self.fired), before)
+        self._decide_more()
         return True
 
-    def _decide(self, guard: Guard) -> bool:
-        """Let a guard fire whose jump is computed in numbers."""
-        assert guard.decide is not None
-        found = guard.decide(self.bound, self._here())
+    def _decide(self, guard: Guard, decide: Decision) -> bool:
+        """Let a guard fire whose jump is computed in numbers; returns whether anything happened."""
+        found = decide(self.bound, self._here())
         if found is None:
             return False
         earlier = self.fired if self.time - self.instant <= SIMULTANEITY else []
@@ -253,7 +253,23 @@ class _Run:
         self._note((guard.name,), before)
         mode = self.bound.mode(self.mode)
         self._settle(mode, mode.evaluate(self.states, self.held))
+        self._decide_more()
         return True
+
+    def _decide_more(self) -> None:
+        """Let decided guards fire that are due at this instant too."""
+        while self.outcome is None:
+            mode = self.bound.mode(self.mode)
+            if not mode.code.decided_here:
+                return
+            values = mode.evaluate(self.states, self.held)
+            due = self._due(values[mode.code.guards], mode.code.decided_here)
+            if due is None:
+                return
+            guard = mode.code.by_name[due].guard
+            assert guard.decide is not None
+            if not self._decide(guard, guard.decide):
+                self.fired.append(due)
 
     def _may_cross(self) -> bool:
         return all(self.held[i] == value for i, value in self.requires)

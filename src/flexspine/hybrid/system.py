@@ -40,9 +40,10 @@ class Guard:
 
     ``target`` is the next mode (None: the same), ``resets`` the new values of states and held
     variables (those not named stay), ``ends`` the outcome if the event ends the run. Instead of
-    these, ``decide`` may compute in numbers what happens; it answers for every other decided guard
-    that is due at the same instant. ``timed`` guards are clocks: however often they fire, and
-    however slowly they are crossed, nothing is wrong.
+    these, ``decide`` may compute in numbers what happens. Such a guard may be ``costly``, its rate
+    worth more than it is to know: then it is not looked for at the instant of another one.
+    ``timed`` guards are clocks: however often they fire, and however slowly they are crossed,
+    nothing is wrong.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Guard:
     arming: Arming = Arming.CROSSING
     ends: OutcomeKind | None = None
     decide: Decision | None = None
+    costly: bool = False
     timed: bool = False
 
     @property

@@ -23,6 +23,9 @@ from flexspine.mechanics.linkage import Array
 # Relative to the largest motion or push: what counts as zero with rounding error.
 ZERO = 1e-11
 
+# Relative; feet whose responses have a singular value this small cannot be pushed independently.
+DEPENDENT = 1e-11
+
 # Relative; motions this close are one, on the border between two combinations.
 SAME = 1e-8
 
@@ -66,7 +69,10 @@ def resolve(
     *,
     count: bool = True,
 ) -> Resolution:
-    """Find what touching feet do, sticking first; without ``count`` the first answer will do.
+    """Find what touching feet do, sticking first.
+
+    Without ``count`` the first answer will do in which pushes are determined: of feet on one link
+    that stand still not all stick then, some slide at no speed.
 
     ``response`` is ``W`` (2k, 2k), ``before`` the feet's motion without pushes (2k,), x and y in
     turn. ``friction`` None: feet that touch do not slide. ``moving`` names the feet that slide
@@ -74,9 +80,20 @@ def resolve(
     independently, as those at both ends of one link, pushes are the least ones.
     """
     feet = len(before) // 2
-    whole = _combinations(tuple(moving or (None,) * feet), friction is not None)
-    combinations = whole if count else whole[:1]
-    pushes = _solve(combinations, response, before, friction or 0.0)
+    combinations = _combinations(tuple(moving or (None,) * feet), friction is not None)
+    free = _independent(response)
+    if not count and free:
+        combinations = combinations[:1]
+    matrix, right = _system(combinations, response, before, friction or 0.0)
+    if not (count or free):
+        sizes = np.linalg.svd(matrix, compute_uv=False)
+        kept = sizes[:, -1] > DEPENDENT * sizes[:, 0]
+        combinations, matrix, right = combinations[kept], matrix[kept], right[kept]
+    pushes: Array
+    if free or not count:
+        pushes = np.linalg.solve(matrix, right[..., None])[..., 0]
+    else:
+        pushes = (np.linalg.pinv(matrix, rcond=DEPENDENT) @ right[..., None])[..., 0]
     after = before + pushes @ response.T
     slides_already = np.array([each is not None for each in moving or (None,) * feet], dtype=bool)
     holds = _holds(combinations, pushes, after, before, friction, slides_already)
@@ -85,7 +102,7 @@ def resolve(
         apart = (np.abs(after[number] - after[other]).max() for other in distinct)
         if all(distance > SAME * np.abs(before).max() for distance in apart):
             distinct.append(number)
-    if not (distinct or count):
+    if not distinct and not count and free:
         return resolve(response, before, friction, moving)
     if not distinct:
         return Resolution(Verdict.NONE, (Contact.OPEN,) * feet, np.zeros((feet, 2)), 0)
@@ -111,10 +128,16 @@ def _combinations(moving: tuple[Contact | None, ...], slides: bool) -> NDArray[n
     return np.array(list(product(*each)), dtype=np.int64)
 
 
-def _solve(
+def _independent(response: Array) -> bool:
+    """Whether feet can be pushed each for itself."""
+    sizes = np.linalg.svd(response, compute_uv=False)
+    return not sizes.size or bool(sizes[-1] > DEPENDENT * sizes[0])
+
+
+def _system(
     combinations: NDArray[np.int64], response: Array, before: Array, friction: float
-) -> Array:
-    """The pushes of every combination, shape (combinations, 2 feet)."""
+) -> tuple[Array, Array]:
+    """The linear system of every combination: its matrix and its right side."""
     count, size = len(combinations), len(before)
     matrix, right = np.zeros((count, size, size)), np.zeros((count, size))
     for foot in range(size // 2):
@@ -131,11 +154,7 @@ def _solve(
         right[slides, n] = -before[n]
         matrix[slides, t, t] = 1.0
         matrix[slides, t, n] = np.where(does[slides] == FORWARD, friction, -friction)
-    try:
-        solved = np.linalg.solve(matrix, right[..., None])
-    except np.linalg.LinAlgError:
-        solved = np.linalg.pinv(matrix) @ right[..., None]
-    return np.asarray(solved[..., 0], dtype=float)
+    return matrix, right
 
 
 def _holds(

@@ -440,7 +440,7 @@ class _Footed:
     def _grips(self, foot: str, tangent: sp.Expr, normal: sp.Expr) -> list[Guard]:
         """Lift-off, and the beginnings of sliding either way."""
         opens = partial(_changed, foot, Contact.OPEN)
-        found = [Guard(f"{foot} lift-off", normal + SLACK, decide=opens)]
+        found = [Guard(f"{foot} lift-off", normal + SLACK, decide=opens, costly=True)]
         grip = self.motion.parameter("friction", self.robot.friction) * normal + SLACK
         # A ground that pushes back lets the foot slide forward.
         for way, slack in (
@@ -448,7 +448,8 @@ class _Footed:
             (Contact.SLIDE_BACK, grip - tangent),
         ):
             slips = partial(_changed, foot, way)
-            found.append(Guard(f"{foot} begins to {way.value}", slack, decide=slips))
+            name = f"{foot} begins to {way.value}"
+            found.append(Guard(name, slack, decide=slips, costly=True))
         return found
 
     def _falls(self) -> list[Guard]:
