@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -187,7 +188,7 @@ def test_a_push_and_what_the_ground_gives_back_are_the_change_of_momentum() -> N
         velocities.append(LINKAGE.com_jacobian(q) @ rates)
     ground = run.impulses(event).sum(axis=0)
     change = LINKAGE.mass * (velocities[1] - velocities[0])
-    assert change == pytest.approx(ground + [1.0, 0.0], abs=1e-10)
+    assert change == pytest.approx(ground + np.array([1.0, 0.0]), abs=1e-10)
     assert np.abs(change).max() > 1e-3
 
 
@@ -221,7 +222,7 @@ def test_energy_is_what_motors_bring_and_dampers_and_impacts_take(name: str) -> 
         return float(LINKAGE.kinetic_energy(q, speed) + weight + 240 * bend**2 / 2)
 
     jumps = 0.0
-    for arc, after in zip(arcs[:-1], arcs[1:], strict=True):
+    for arc, after in pairwise(arcs):
         jumps += energy(after.series[0, :, 0]) - energy(arc(np.array([arc.end]))[0])
     whole = energy(arcs[-1](np.array([arcs[-1].end]))[0]) - energy(arcs[0].series[0, :, 0])
     assert whole == pytest.approx(work + jumps, abs=1e-9)
@@ -310,7 +311,9 @@ def test_feet_swing_as_high_as_asked_for() -> None:
     def low(s: float) -> float:
         return -(0.04 * np.sin(np.pi * s) ** 2 + 0.05 * 0.4 * s**2 * (1 - s))
 
-    highest = -minimize_scalar(low, bounds=(0.3, 0.7), method="bounded", options={"xatol": 1e-9}).fun
+    highest = -minimize_scalar(
+        low, bounds=(0.3, 0.7), method="bounded", options={"xatol": 1e-9}
+    ).fun
     assert 0.04 < highest < 0.043
     heights = dataset(tracking)["foot"].values[2000:, :, 1]
     assert heights.max(axis=0) == pytest.approx(np.full(4, highest), abs=1e-5)
@@ -378,7 +381,8 @@ def test_half_as_stiff_a_spine_shifts_torques_but_no_joint() -> None:
 
     Cut at the spine: a horizontal force on the fore foot that stands, opposite to that on the
     hind one, brings the moment, by the arm of the hips' height. It turns the hips that stand by
-    as much and their knees by the force times their height; legs that swing are left alone.
+    as much and their knees by the force times their height; legs that swing are left alone. All
+    signs follow from the balance of generalized forces at one instant.
     """
     soft = ROBOT.with_values({"spine.stiffness": 120.0})
     times = np.linspace(0.01, 1.99, 199)
@@ -387,7 +391,7 @@ def test_half_as_stiff_a_spine_shifts_torques_but_no_joint() -> None:
     )
     assert np.abs(stiff["angle"].values - other["angle"].values).max() < 1e-10
     bend = stiff["angle"].sel(joint="spine").values
-    moment = -120.0 * (bend + 0.05)  # less of it, on the fore part, counter-clockwise
+    moment = -120.0 * (bend + 0.05)  # what the feet have to bring about, counter-clockwise
     change = {m: (other["torque"] - stiff["torque"]).sel(motor=m).values for m in own.MOTORS}
     force = {
         t: (other["grf"] - stiff["grf"]).sel(foot_name=t).values for t in own.TOES
@@ -397,10 +401,7 @@ def test_half_as_stiff_a_spine_shifts_torques_but_no_joint() -> None:
     fore = np.where(stands[:, 2], force["toe_3"][:, 0], force["toe_4"][:, 0])
     assert hind == pytest.approx(-fore, abs=1e-7)
     assert all(np.abs(each[:, 1]).max() < 0.01 for each in force.values())
-    assert np.abs(fore) == pytest.approx(np.abs(moment) / 0.33, rel=2e-3)
-    # The spring of the straight spine lifts it (its rest angle is negative); less of that lets
-    # the feet spread less.
-    assert (np.sign(fore) == np.sign(-moment)).all() or (np.sign(fore) == np.sign(moment)).all()
+    assert fore == pytest.approx(moment / 0.33, rel=2e-3)
     knees = {t: stiff["link_start"].sel(link=f"shank_{t[-1]}").values[:, 1] for t in own.TOES[1:]}
     knees["toe_1"] = stiff["link_end"].sel(link="shank_1").values[:, 1]
     for place, (toe, knee) in enumerate(zip(own.TOES, ("knee_1", "knee_2", "knee_3", "knee_4"),
@@ -411,6 +412,17 @@ def test_half_as_stiff_a_spine_shifts_torques_but_no_joint() -> None:
         expected = stands[:, place] * np.abs(moment)
         assert np.abs(change[hip]) == pytest.approx(expected, abs=0.01)
     assert np.abs(change["hip_1"]) == pytest.approx(np.abs(moment), abs=0.01)
+    for i in range(20, 199, 40):
+        feet = [toe for place, toe in enumerate(own.TOES) if stands[i, place]]
+        q = np.zeros(12)
+        q[0] = stiff["link_angle"].values[i, 0]
+        q[[LINKAGE.place[str(j)] for j in stiff["joint"].values]] = stiff["angle"].values[i]
+        unknown = np.hstack([LINKAGE.actuation, LINKAGE.foot_jacobian(q, feet).T])
+        needed = np.zeros(12)
+        needed[LINKAGE.place["spine"]] = moment[i]
+        solved = np.linalg.solve(unknown, needed)
+        mine = [*(change[m][i] for m in own.MOTORS), *np.ravel([force[t][i] for t in feet])]
+        assert mine == pytest.approx(solved, abs=1e-6)
 
 
 def test_the_guard_of_a_straight_line_is_the_area_between_feet_and_spine() -> None:
@@ -450,15 +462,16 @@ def test_torques_change_at_ticks_of_the_clock_only(make: Callable[[], RobotRun])
     assert changed.mean() > 0.99
 
 
-def test_sampled_torques_track_well_but_for_landings() -> None:
+def test_what_landings_do_to_sampled_joints_fades() -> None:
+    """Within 0.2 s an error falls to ``5 exp(-4)`` of itself; what is left, held torques make."""
     data = dataset(sampled)
     times = data["time"].values
     landings = [t for t, kind in zip(data["event_time"].values, data["event_kind"].values,
                                      strict=True) if "touchdown" in str(kind)]  # fmt: skip
     since = np.array([min([t - each for each in landings if each <= t], default=t) for t in times])
-    calm = (data["stands"].values.sum(axis=1) == 2) & (since > 0.02)
+    calm = (data["stands"].values.sum(axis=1) == 2) & (since > 0.2)
     error = np.abs(data["angle"].sel(joint=data["motor"].values).values - data["reference"].values)
-    assert calm.mean() > 0.8
+    assert calm.mean() > 0.4
     assert error[calm].max() < 3e-3
 
 
@@ -573,12 +586,10 @@ def test_a_robot_with_two_legs_has_no_diagonals() -> None:
 def test_steps_that_are_too_long_end_out_of_reach() -> None:
     run = trot(ROBOT, Trot(seconds=2.0, gait=Gait(speed=3.0)))
     assert run.outcome.name == "out_of_reach"
-    reach = [
-        np.hypot(*(step.foot(toe, np.array(run.trajectory.end.time))[0] - hip))
-        for step in plan(run, own.Asked(speed=3.0))[-1:]
-        for toe in own.TOES
-        for hip in [np.array([step.body(np.array(run.trajectory.end.time))[0] + own.HIPS[toe], 0.33])]
-    ]  # fmt: skip
+    end = np.array(run.trajectory.end.time)
+    step = plan(run, own.Asked(speed=3.0))[-1]
+    x, _ = step.body(end)
+    reach = [np.hypot(*(step.foot(t, end)[0] - [x + own.HIPS[t], 0.33])) for t in own.TOES]
     assert max(reach) == pytest.approx(0.999 * 0.41, abs=1e-9)
 
 
