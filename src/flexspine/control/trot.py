@@ -10,7 +10,7 @@ from flexspine.control.computed_torque import ComputedTorque, Gains
 from flexspine.control.joint_springs import SpringDriven
 from flexspine.control.laws import JointSprings, Law, LeastResidual, SevenOutputs, Tracking
 from flexspine.control.sampled import Sampled
-from flexspine.control.walking import Gait, Walker
+from flexspine.control.walking import LONGEST, Gait, Walker
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
@@ -133,17 +133,28 @@ def _check(asked: Trot) -> None:
         if getattr(asked, name) is not None:
             check_between(name, getattr(asked, name), 0, 1e6)
     check_between("push", asked.push, -1e3, 1e3)
+    if asked.push_time is not None:
+        check_between("push_time", asked.push_time, 0, asked.seconds)
 
 
 def _check_standing(made: Walker) -> None:
     """Raise `ParameterError` for a robot that is not made for this."""
     legs = made.walk.legs
     _ = made.walk.pairs
-    reach = min(leg.reach for leg in legs.values())
-    if made.gait.height >= reach:
+    gait = made.gait
+    reach = LONGEST * min(leg.reach for leg in legs.values())
+    if gait.height >= reach:
         raise ParameterError(
-            f"gait.height = {made.gait.height:g} m is beyond the legs' reach of {reach:g} m",
+            f"gait.height = {gait.height:g} m is beyond the legs' reach of {reach:g} m",
             "lower the hips",
+        )
+    room = gait.height - gait.highest
+    folded = max(abs(leg.thigh_length - leg.shank_length) for leg in legs.values())
+    if room <= folded:
+        raise ParameterError(
+            f"gait.height = {gait.height:g} m leaves {room:g} m between hips and lifted feet, but "
+            f"a folded leg takes {folded:g} m",
+            "raise the hips, or lower gait.clearance, gait.landing or gait.stance",
         )
     if isinstance(made, ComputedTorque) and made.robot.linkage.size - len(made.motors) < 4:
         raise ParameterError(

@@ -69,6 +69,11 @@ class Gait:
         """The speed that is wanted after so many steps."""
         return self.speed * min(1.0, steps / self.ramp)
 
+    @property
+    def highest(self) -> float:
+        """What no foot is lifted above; ``s^2 (1 - s)`` is 4/27 at most."""
+        return self.clearance + self.landing * self.stance * 4 / 27
+
 
 def diagonal_pairs(legs: Mapping[str, Leg]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The pairs of a trot: a hind leg and the fore leg of the other side.
