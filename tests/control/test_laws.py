@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,7 +132,7 @@ def test_the_least_residual_is_none_where_tracking_is_possible(
     assert residual(now, LeastResidual().torques(now)) < 1e-9
 
 
-CASES = {
+CASES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "low limits": (("toe_1", "toe_4"), {"limit": 8.0}),
     "lower limits": (("toe_2", "toe_3"), {"limit": 11.0}),
     "little friction": (("toe_1", "toe_4"), {"friction": 0.01}),

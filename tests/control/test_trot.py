@@ -284,6 +284,17 @@ def test_hips_stay_level_at_the_height_that_was_asked_for() -> None:
     assert np.abs(fore[:, 1] - 0.33).max() < 1e-4
 
 
+def test_knees_stay_behind_the_lines_from_hips_to_feet() -> None:
+    data = dataset(tracking)
+    for leg, toe in zip("1234", own.TOES, strict=True):
+        first = leg == "1"  # which is counted from its toe upwards
+        knee = data["link_end" if first else "link_start"].sel(link=f"shank_{leg}").values
+        hip = data["link_end" if first else "link_start"].sel(link=f"thigh_{leg}").values
+        foot = data["foot"].sel(foot_name=toe).values
+        down, out = foot - hip, knee - hip
+        assert (down[:, 0] * out[:, 1] - down[:, 1] * out[:, 0]).max() < -1e-3
+
+
 @pytest.mark.parametrize("speed", [0.2, 0.4])
 def test_feet_come_straight_down_at_the_landing_speed(speed: float) -> None:
     """At the ends of all swings but the first, which ends where the next step begins."""
@@ -536,6 +547,13 @@ REFUSED = {
     "speed beyond sense": (Trot(gait=Gait(speed=-11.0)), "gait.speed = -11", "above -10"),
     "no number": (Trot(gait=Gait(speed=NAN)), "gait.speed = nan", "above -10"),
     "hips too high": (Trot(gait=Gait(height=0.5)), "gait.height = 0.5", "lower the hips"),
+    "hips all but too high": (Trot(gait=Gait(height=0.41)), "gait.height = 0.41", "lower the hips"),
+    "hips too low": (Trot(gait=Gait(height=0.05)), "gait.height = 0.05", "raise the hips"),
+    "feet at the hips": (Trot(gait=Gait(clearance=0.24)), "takes 0.09 m", "gait.clearance"),
+    "feet thrown up": (Trot(gait=Gait(landing=5.0)), "takes 0.09 m", "gait.landing"),
+    "a push before time": (Trot(push=1.0, push_time=-1.0), "push_time = -1", "above 0"),
+    "a push after all": (Trot(seconds=2.0, push=1.0, push_time=3.0), "push_time = 3", "below 2"),
+    "a push at no time": (Trot(push=1.0, push_time=NAN), "push_time = nan", "above 0"),
     "hips in the ground": (Trot(gait=Gait(height=-0.1)), "gait.height = -0.1", "above 0"),
     "no steps": (Trot(gait=Gait(ramp=0)), "gait.ramp = 0", "whole number"),
     "half a step": (Trot(gait=Gait(ramp=2.5)), "gait.ramp = 2.5", "whole number"),  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -232,7 +233,7 @@ class Tampered:
     def __init__(
         self, monkeypatch: pytest.MonkeyPatch, **changes: Callable[[Array], Array]
     ) -> None:
-        def changed(run: RobotRun, **options: float) -> xr.Dataset:
+        def changed(run: RobotRun, **options: Any) -> xr.Dataset:
             dataset = robot_dataset(run, **options)
             for name, change in changes.items():
                 dataset[name] = (dataset[name].dims, change(dataset[name].values.copy()))
