@@ -95,12 +95,10 @@ def test_a_clock_and_limits_are_kept_to(cli: Cli) -> None:
 
 
 def test_a_push_is_felt(cli: Cli) -> None:
-    calm, pushed = (
-        json.loads(cli("trot", "--seconds", "1.2", "--push", push, "--json").stdout)
-        for push in ("0", "0.5")
-    )
-    assert pushed["outcome"] == "completed"
-    assert pushed["measures"]["error"] > 20 * calm["measures"]["error"]
+    """0.5 N s make joints err by far more than landings do, by some 4e-5 rad."""
+    record = json.loads(cli("trot", "--seconds", "1.2", "--push", "0.5", "--json").stdout)
+    assert record["outcome"] == "completed"
+    assert record["measures"]["error"] > 1e-3
 
 
 def test_a_fall_is_exit_code_1_with_advice(cli: Cli, tmp_path: Path) -> None:

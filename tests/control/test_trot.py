@@ -178,26 +178,42 @@ def test_a_push_is_made_good_within_a_second() -> None:
     assert step.speed == pytest.approx(0.3, rel=1e-3)
 
 
-def test_a_push_and_what_the_ground_gives_back_are_the_change_of_momentum() -> None:
-    run = pushed()
-    event = next(e for e in run.trajectory.events if "push" in e.names)
-    before = next(arc for arc in run.trajectory.arcs if arc.end == event.time)
-    velocities = []
-    for states in (before(np.array([event.time]))[0], event.after.states):
-        q, rates = LINKAGE.to_relative @ states[:12], LINKAGE.to_relative @ states[12:24]
-        velocities.append(LINKAGE.com_jacobian(q) @ rates)
-    ground = run.impulses(event).sum(axis=0)
-    change = LINKAGE.mass * (velocities[1] - velocities[0])
-    assert change == pytest.approx(ground + np.array([1.0, 0.0]), abs=1e-10)
-    assert np.abs(change).max() > 1e-3
+@pytest.mark.parametrize("name", RUNS)
+def test_pushes_and_what_the_ground_gives_back_are_changes_of_momentum(name: str) -> None:
+    """At every impact, of however many feet; feet in the air have no share in it.
+
+    Bounces of 1e-14 m and less are left out: at 100 m/s^2 that is a speed of 1.4e-6 m/s of a foot
+    whose share of the mass is below 1 kg. Where both feet land at once there are none.
+    """
+    left_out = 1e-10 if name == "tracking" else 1.4e-6
+    run, largest, pushes = RUNS[name](), 0.0, 0
+    ends = {arc.end: arc for arc in run.trajectory.arcs if arc.end > arc.start}
+    for event in run.trajectory.events:
+        if not event.names[0].endswith(("touchdown", "push")) or event.time not in ends:
+            continue
+        velocities = []
+        for states in (ends[event.time](np.array([event.time]))[0], event.after.states):
+            q, rates = LINKAGE.to_relative @ states[:12], LINKAGE.to_relative @ states[12:24]
+            velocities.append(LINKAGE.com_jacobian(q) @ rates)
+        impulses = run.impulses(event)
+        change = LINKAGE.mass * (velocities[1] - velocities[0])
+        given = [1.0 * event.names.count("push"), 0.0]
+        assert change == pytest.approx(impulses.sum(axis=0) + given, abs=left_out)
+        heights = [LINKAGE.foot(q, toe)[1] for toe in own.TOES]
+        assert (np.abs(impulses[np.array(heights) > 1e-6]) == 0).all()
+        largest = max(largest, float(np.abs(change).max()))
+        pushes += event.names.count("push")
+    assert largest > 1e-3
+    assert pushes == (name == "pushed")
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_energy_is_what_motors_bring_and_dampers_and_impacts_take(name: str) -> None:
     """Work and loss integrated anew, by Gauss's rule on every step of the integrator."""
     run, spine = RUNS[name](), LINKAGE.place["spine"]
+    until = 4 if name == "pushed" else 2
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    arcs = [arc for arc in run.trajectory.arcs if arc.start < 4 and arc.end > arc.start]
+    arcs = [arc for arc in run.trajectory.arcs if arc.start < until and arc.end > arc.start]
     spans = [(a, b) for arc in arcs for a, b in zip(arc.times[:-1], arc.times[1:], strict=True)]
     low, high = np.array(spans).T
     grid = ((low + high)[:, None] + (high - low)[:, None] * nodes) / 2

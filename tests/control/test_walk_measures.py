@@ -57,7 +57,7 @@ def summary(make: Make) -> WalkSummary:
 @cache
 def data(make: Make) -> xr.Dataset:
     """At other times than every millisecond."""
-    times = np.linspace(0, make().trajectory.duration, 30011)
+    times = np.linspace(0, make().trajectory.duration, 15013)
     return robot_dataset(make(), times=times)
 
 
@@ -106,7 +106,7 @@ def test_speed_and_cost_are_of_whole_pairs_of_steps_in_the_second_half(make: Mak
     late = late[late >= run.trajectory.duration / 2]
     late = late[(len(late) + 1) % 2 :]
     assert len(late) % 2 == 1
-    times = np.linspace(late[0], late[-1], 40001)
+    times = np.linspace(late[0], late[-1], 20001)
     fine = robot_dataset(run, times=times)
     x = fine["com"].values[:, 0]
     distance = x[-1] - x[0]
