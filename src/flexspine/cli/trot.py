@@ -18,7 +18,7 @@ from flexspine.errors import InputError, UnknownNameError
 if TYPE_CHECKING:
     from flexspine.control.spine_comparison import SpineComparison
     from flexspine.control.walk_measures import WalkSummary
-    from flexspine.control.walking import Gait
+    from flexspine.control.walking import Pace
     from flexspine.models.robot_run import RobotRun
 
 DEFAULT_ROBOT = "sc618"
@@ -148,20 +148,20 @@ def trot(
     return 0 if run.outcome.completed else 1
 
 
-def _gait(given: Mapping[str, float]) -> Gait:
+def _gait(given: Mapping[str, float]) -> Pace:
     """The gait with some numbers changed. Raises `UnknownNameError`."""
     from dataclasses import fields
 
-    from flexspine.control.walking import Gait
+    from flexspine.control.walking import Pace
 
-    known = [each.name for each in fields(Gait)]
+    known = [each.name for each in fields(Pace)]
     for name in given:
         if name not in known:
             raise UnknownNameError("gait parameter", name, known)
     changes: dict[str, Any] = dict(given)
     if "ramp" in given and given["ramp"].is_integer():
         changes["ramp"] = int(given["ramp"])
-    return Gait(**changes)
+    return Pace(**changes)
 
 
 def _refuse_besides_compare(controller: str, rate: float | None, limit: float | None) -> None:

@@ -13,7 +13,7 @@ from flexspine.control.cpg_driven import CpgDriven
 from flexspine.control.joint_springs import SpringDriven
 from flexspine.control.laws import JointSprings, Law, LeastResidual, SevenOutputs, Tracking
 from flexspine.control.sampled import Sampled
-from flexspine.control.walking import Gait, Walker, diagonal_pairs
+from flexspine.control.walking import LONGEST, Pace, Walker, diagonal_pairs
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
@@ -52,7 +52,7 @@ class Trot:
 
     seconds: float = 20.0
     controller: str = "tracking"
-    gait: Gait = field(default_factory=Gait)
+    gait: Pace = field(default_factory=Pace)
     rate: float | None = None
     limit: float | None = None
     stiffness: float | None = None
@@ -87,7 +87,7 @@ def trot(
     settings = {
         "controller": asked.controller,
         "rate": drive.rate if isinstance(drive, Clocked) else None,
-        **{f"gait.{each.name}": getattr(asked.gait, each.name) for each in fields(Gait)},
+        **{f"gait.{each.name}": getattr(asked.gait, each.name) for each in fields(Pace)},
         **{
             each.name: getattr(asked, each.name)
             for each in fields(Trot)
@@ -139,7 +139,7 @@ def driven(robot: Robot, asked: Trot) -> Walker | CpgDriven:
     return made
 
 
-def _oscillators(robot: Robot, gait: Gait) -> Cpg:
+def _oscillators(robot: Robot, gait: Pace) -> Cpg:
     """Oscillators that trot as the gait says."""
     cycle = gait.stance / DUTY
     return Cpg(
@@ -168,17 +168,27 @@ def _check(asked: Trot) -> None:
         if getattr(asked, name) is not None:
             check_between(name, getattr(asked, name), 0, 1e6)
     check_between("push", asked.push, -1e3, 1e3)
+    if asked.push_time is not None:
+        check_between("push_time", asked.push_time, 0, asked.seconds)
 
 
-def _check_robot(robot: Robot, gait: Gait) -> None:
+def _check_robot(robot: Robot, gait: Pace) -> None:
     """Raise `ParameterError` for a robot that is not made for this."""
     legs = legs_of(robot)
     diagonal_pairs(legs)
-    reach = min(leg.reach for leg in legs.values())
+    reach = LONGEST * min(leg.reach for leg in legs.values())
     if gait.height >= reach:
         raise ParameterError(
             f"gait.height = {gait.height:g} m is beyond the legs' reach of {reach:g} m",
             "lower the hips",
+        )
+    room = gait.height - gait.highest
+    folded = max(abs(leg.thigh_length - leg.shank_length) for leg in legs.values())
+    if room <= folded:
+        raise ParameterError(
+            f"gait.height = {gait.height:g} m leaves {room:g} m between hips and lifted feet, but "
+            f"a folded leg takes {folded:g} m",
+            "raise the hips, or lower gait.clearance, gait.landing or gait.stance",
         )
 
 

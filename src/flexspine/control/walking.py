@@ -52,7 +52,7 @@ OUT_OF_REACH = OutcomeKind(
 
 
 @dataclass(frozen=True)
-class Gait:
+class Pace:
     """How to walk, in SI units.
 
     ``height`` is that of the hips, ``stance`` how long a pair of legs stands, ``clearance`` how
@@ -73,6 +73,11 @@ class Gait:
         aim = self.speed if time < self.stop else 0.0
         most = steps * abs(self.speed) / self.ramp
         return speed + min(max(aim - speed, -most), most)
+
+    @property
+    def highest(self) -> float:
+        """What no foot is lifted above; ``s^2 (1 - s)`` is 4/27 at most."""
+        return self.clearance + self.landing * self.stance * 4 / 27
 
 
 Pairs = tuple[tuple[str, ...], tuple[str, ...]]
@@ -105,7 +110,7 @@ class Walk:
     """The plan of a walk for one robot."""
 
     robot: Robot
-    gait: Gait
+    gait: Pace
 
     @cached_property
     def legs(self) -> dict[str, Leg]:
@@ -209,7 +214,7 @@ def _sinks(leg: str, held: Mapping[sp.Symbol, float]) -> bool:
 class Walker(Drive):
     """A drive that walks; how torques follow from what joints are to do is left to its kinds."""
 
-    gait: Gait = field(default_factory=Gait)
+    gait: Pace = field(default_factory=Pace)
 
     @cached_property
     def walk(self) -> Walk:

@@ -89,11 +89,11 @@ def resolve(
         sizes = np.linalg.svd(matrix, compute_uv=False)
         kept = sizes[:, -1] > DEPENDENT * sizes[:, 0]
         combinations, matrix, right = combinations[kept], matrix[kept], right[kept]
-    pushes: Array
     if free or not count:
-        pushes = np.linalg.solve(matrix, right[..., None])[..., 0]
+        solved = np.linalg.solve(matrix, right[..., None])
     else:
-        pushes = (np.linalg.pinv(matrix, rcond=DEPENDENT) @ right[..., None])[..., 0]
+        solved = np.linalg.pinv(matrix, rcond=DEPENDENT) @ right[..., None]
+    pushes = np.asarray(solved[..., 0], dtype=float)
     after = before + pushes @ response.T
     slides_already = np.array([each is not None for each in moving or (None,) * feet], dtype=bool)
     holds = _holds(combinations, pushes, after, before, friction, slides_already)
