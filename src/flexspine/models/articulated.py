@@ -252,15 +252,16 @@ class BoundRobot(BoundSystem):
 
     def _by_speed(self, moment: Moment) -> Moment:
         """The moment with feet that slide the way they move; those at rest stick for now."""
-        contacts, rests = dict(moment.footing.contacts), False
+        contacts: dict[str, Contact] = {}
+        rests: dict[str, Contact] = {}
         for foot, does in moment.footing.contacts:
             if does is not Contact.STICK:
                 row = self.linkage.foot_jacobian(moment.q, [foot])[0]
                 speed = float(row @ moment.rates)
                 contacts[foot] = Contact.SLIDE_FORWARD if speed > 0 else Contact.SLIDE_BACK
                 if abs(speed) <= AT_REST:
-                    contacts[foot], rests = Contact.STICK, True
-        after = replace(moment, footing=Footing.of(contacts, self.robot.feet))
+                    rests[foot] = Contact.STICK
+        after = touching(self, moment, contacts | rests)
         return self._held_still(after) if rests else after
 
     def _lingering(self, moment: Moment, accelerations: Array) -> list[str]:
