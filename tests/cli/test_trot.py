@@ -86,12 +86,12 @@ def test_results_are_written_and_readable(cli: Cli, tmp_path: Path) -> None:
 
 
 def test_a_clock_and_limits_are_kept_to(cli: Cli) -> None:
-    done = cli("trot", "--seconds", "1", "--rate", "400", "--limit", "16", "--json")
+    done = cli("trot", "--seconds", "1", "--rate", "400", "--limit", "13", "--json")
     assert done.returncode == 0, done.stderr
     record = json.loads(done.stdout)
     assert record["settings"]["rate"] == 400
-    assert record["settings"]["limit"] == 16
-    assert record["measures"]["torque"] == 16
+    assert record["settings"]["limit"] == 13
+    assert record["measures"]["torque"] == 13
 
 
 def test_a_push_is_felt(cli: Cli) -> None:

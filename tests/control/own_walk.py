@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -126,8 +127,17 @@ class Asked:
     landing: float = 0.05
     ramp: int = 4
 
-    def aim(self, steps: int) -> float:
-        return self.speed * min(1.0, steps / self.ramp)
+    def after(self, speed: float, steps: int) -> float:
+        """No step changes the speed by more than its share of the whole."""
+        most = steps * abs(self.speed) / self.ramp
+        return speed + float(np.clip(self.speed - speed, -most, most))
+
+
+# Of sin^2 (pi s) (1 - s^2), the shape of a swing.
+HIGHEST = -minimize_scalar(
+    lambda s: -(np.sin(np.pi * s) ** 2) * (1 - s**2),
+    bounds=(0.3, 0.6), method="bounded", options={"xatol": 1e-12},
+).fun  # fmt: skip
 
 
 @dataclass
@@ -143,7 +153,7 @@ class Step:
     gain: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self.gain = (self.asked.aim(self.number + 1) - self.speed) / self.asked.stance
+        self.gain = (self.asked.after(self.speed, 1) - self.speed) / self.asked.stance
 
     @property
     def swings(self) -> Sequence[str]:
@@ -157,7 +167,7 @@ class Step:
     def aim(self, toe: str) -> float:
         """A foot lands so that the hip passes over it half-way through its time on the ground."""
         asked = self.asked
-        at_end, later = asked.aim(self.number + 1), asked.aim(self.number + 2)
+        at_end, later = asked.after(self.speed, 1), asked.after(self.speed, 2)
         travelled = (self.speed + at_end) / 2 * asked.stance
         to_come = (at_end + later) / 2 * asked.stance
         return self.x + HIPS[toe] + travelled + to_come / 2
@@ -170,10 +180,12 @@ class Step:
         asked, stride = self.asked, self.aim(toe) - self.stood[toe]
         s, turn = (time - self.start) / asked.stance, 2 * np.pi
         x = self.stood[toe] + stride * (s - np.sin(turn * s) / turn)
-        y = asked.clearance * np.sin(np.pi * s) ** 2
+        lift = np.sin(np.pi * s) ** 2
+        y = asked.clearance * lift * (1 - s**2) / HIGHEST
         y = y + asked.landing * asked.stance * (s**2 - s**3)
         dx = stride * (1 - np.cos(turn * s)) / asked.stance
-        dy = asked.clearance * np.pi * np.sin(turn * s) / asked.stance
+        dy = np.pi * np.sin(turn * s) * (1 - s**2) - 2 * s * lift
+        dy = dy * asked.clearance / HIGHEST / asked.stance
         dy = dy + asked.landing * (2 * s - 3 * s**2)
         return np.stack([x, y], axis=-1), np.stack([dx, dy], axis=-1)
 

@@ -251,9 +251,9 @@ def test_seven_outputs_are_finite_on_any_feet(feet: tuple[str, ...]) -> None:
 
 
 def test_springs_and_dampers_pull_by_what_joints_are_off() -> None:
-    """Joint by joint, knee_1 first: 300 N m/rad and 5 N m s/rad, or what is given."""
+    """Joint by joint, knee_1 first: 300 N m/rad and 4 N m s/rad, or what is given."""
     now = situation(FLEXIBLE)
-    for law, k, c in ((JointSprings(), 300.0, 5.0), (JointSprings(20.0, 0.5), 20.0, 0.5)):
+    for law, k, c in ((JointSprings(), 300.0, 4.0), (JointSprings(20.0, 0.5), 20.0, 0.5)):
         torques = law.torques(now)
         for i, motor in enumerate(own.MOTORS):
             place = FLEXIBLE.place[motor]

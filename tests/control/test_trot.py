@@ -336,7 +336,8 @@ def test_feet_land_ahead_of_their_hips_by_half_a_stance() -> None:
 
 def test_feet_swing_as_high_as_asked_for() -> None:
     def low(s: float) -> float:
-        return -(0.04 * np.sin(np.pi * s) ** 2 + 0.05 * 0.4 * s**2 * (1 - s))
+        lift = np.sin(np.pi * s) ** 2 * (1 - s**2) / own.HIGHEST
+        return -(0.04 * lift + 0.05 * 0.4 * s**2 * (1 - s))
 
     highest = -minimize_scalar(
         low, bounds=(0.3, 0.7), method="bounded", options={"xatol": 1e-9}
@@ -412,7 +413,7 @@ def test_half_as_stiff_a_spine_shifts_torques_but_no_joint() -> None:
     signs follow from the balance of generalized forces at one instant.
     """
     soft = ROBOT.with_values({"spine.stiffness": 120.0})
-    times = np.linspace(0.01, 1.99, 199)
+    times = np.linspace(0.013, 1.993, 199)
     stiff, other = (
         robot_dataset(trot(robot, Trot(seconds=2.0)), times=times) for robot in (ROBOT, soft)
     )
@@ -489,17 +490,11 @@ def test_torques_change_at_ticks_of_the_clock_only(make: Callable[[], RobotRun])
     assert changed.mean() > 0.99
 
 
-def test_what_landings_do_to_sampled_joints_fades() -> None:
-    """Within 0.2 s an error falls to ``5 exp(-4)`` of itself; what is left, held torques make."""
+def test_sampled_joints_stay_close_to_what_they_are_asked_for() -> None:
+    """Within 3e-3 rad, while feet land, too."""
     data = dataset(sampled)
-    times = data["time"].values
-    landings = [t for t, kind in zip(data["event_time"].values, data["event_kind"].values,
-                                     strict=True) if "touchdown" in str(kind)]  # fmt: skip
-    since = np.array([min([t - each for each in landings if each <= t], default=t) for t in times])
-    calm = (data["stands"].values.sum(axis=1) == 2) & (since > 0.2)
     error = np.abs(data["angle"].sel(joint=data["motor"].values).values - data["reference"].values)
-    assert calm.mean() > 0.4
-    assert error[calm].max() < 3e-3
+    assert 1e-4 < error.max() < 3e-3
 
 
 def test_limits_of_torques_are_never_exceeded_and_reached() -> None:
@@ -535,7 +530,7 @@ def test_it_trots_with_a_flexible_and_a_locked_spine(controller: str, body: str)
 
 
 def test_springs_pull_joints_by_what_they_are_off() -> None:
-    """``t = 300 (to be - is) + 5 (to be' - is')``, the wanted rate by differences."""
+    """``t = 300 (to be - is) + 4 (to be' - is')``, the wanted rate by differences."""
     run, checked = springs(), 0
     h = 1e-5
     for step in plan(run)[3:9]:
@@ -632,6 +627,6 @@ def test_the_settings_are_kept_with_the_run() -> None:
     assert settings["controller"] == "tracking"
     assert settings["rate"] is None
     assert {k: v for k, v in settings.items() if k.startswith("gait.")} == {
-        f"gait.{k}": v for k, v in asdict(Pace()).items()
-    }
+        f"gait.{k}": v for k, v in asdict(Pace()).items() if k != "stop"
+    } | {"gait.stop": None}
     assert trot(ROBOT, Trot(seconds=0.01, controller="qp")).settings["rate"] == 400.0

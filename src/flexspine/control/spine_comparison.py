@@ -17,6 +17,9 @@ from flexspine.models.robot_run import RobotRun, robot_dataset
 # Laws under which the spine can move.
 COMPARED = ("com", "pd")
 
+# s; how far from events two runs are compared.
+APART = 1e-6
+
 # Of the spine's stiffness; how much it is changed to see what tracking makes of it.
 SOFTER = 0.5
 
@@ -95,6 +98,9 @@ def spine_of(robot: Robot) -> str:
 def _change(one: RobotRun, other: RobotRun) -> tuple[float, float]:
     """The largest differences of joint angles and of torques between two runs."""
     times = np.linspace(0, min(one.trajectory.duration, other.trajectory.duration), 1001)
+    # Torques jump at events, which rounding may put before or after a time.
+    met = np.array([event.time for run in (one, other) for event in run.events])
+    times = times[np.abs(times[:, None] - met).min(axis=1, initial=np.inf) > APART]
     first, second = (robot_dataset(run, times=times) for run in (one, other))
     return (
         float(np.abs(first["angle"].values - second["angle"].values).max()),
