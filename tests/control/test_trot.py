@@ -543,7 +543,7 @@ def test_springs_pull_joints_by_what_they_are_off() -> None:
         rate = (asked[:, 2] - asked[:, 0]) / (2 * h)
         here = data.isel(time=slice(1, None, 3)).sel(joint=data["motor"].values)
         expected = 300 * (asked[:, 1] - here["angle"].values)
-        expected += 5 * (rate - here["angle_rate"].values)
+        expected += 4 * (rate - here["angle_rate"].values)
         assert here["torque"].values == pytest.approx(expected, abs=1e-5)
         checked += 1
     assert checked == 6
