@@ -26,9 +26,13 @@ pictures: $(VENV)/.installed
 	$(BIN)/flexspine study --out $(OUT)/pictures/study
 	$(BIN)/flexspine basin --out $(OUT)/pictures/basin
 	$(BIN)/flexspine map --out $(OUT)/pictures/map
+	$(BIN)/flexspine trot --seconds 3.2 --out $(OUT)/pictures/trot
+	$(BIN)/python -c "from flexspine import load_robot, plot_coordinates as p; p(load_robot('sc618')).savefig('docs/images/sc618_coordinates.png')"
 	mkdir -p docs/images
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
 	cp $(OUT)/pictures/study/peak_grf_over_speed.png docs/images/
+	cp $(OUT)/pictures/trot/figure.png docs/images/trot.png
+	cp $(OUT)/pictures/trot/animation.gif docs/images/trot.gif
 	cp $(OUT)/pictures/basin/basin.png $(OUT)/pictures/map/map.png docs/images/
 
 $(VENV)/bin/python:
@@ -36,7 +40,7 @@ $(VENV)/bin/python:
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
 $(VENV)/.installed: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --editable .
+	$(BIN)/python -m pip install --quiet --editable '.[engine]'
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml

@@ -10,6 +10,13 @@ from typing import TYPE_CHECKING, Any
 from flexspine._version import __version__
 
 if TYPE_CHECKING:
+    from flexspine.control.cpg import Cpg, rhythm
+    from flexspine.control.distribution import Aim, ForceFamily, force_family
+    from flexspine.control.leg_function import standing
+    from flexspine.control.spine_comparison import SpineComparison, compare_spines
+    from flexspine.control.trot import Trot, trot
+    from flexspine.control.walk_measures import WalkSummary, summarize_walk
+    from flexspine.control.walking import Pace
     from flexspine.errors import FlexspineError, InputError, MachineError
     from flexspine.gaits.continuation import Branch, trace_branch
     from flexspine.gaits.files import load_gait, save_gait
@@ -26,12 +33,15 @@ if TYPE_CHECKING:
     from flexspine.models.presets import load_model, preset_names
     from flexspine.models.robot import Robot
     from flexspine.models.robot_file import load_robot, robot_names
+    from flexspine.models.robot_run import RobotRun, robot_dataset
     from flexspine.models.simulation import Run, simulate
     from flexspine.report.animation import animate, strip
     from flexspine.report.basin_figure import plot_basin
+    from flexspine.report.coordinates_figure import plot_coordinates
     from flexspine.report.figure import plot_run
     from flexspine.report.map_figure import plot_map
     from flexspine.report.pinned_figure import plot_pinned
+    from flexspine.report.robot_figure import plot_robot
     from flexspine.studies.basin import Basin, basin_plan, read_basins
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
     from flexspine.studies.pinned_check import PinnedCheck, check_pinned
@@ -40,110 +50,144 @@ if TYPE_CHECKING:
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
 
 _HOMES = {
+    "Aim": "control.distribution",
     "Basin": "studies.basin",
     "Branch": "gaits.continuation",
+    "Cpg": "control.cpg",
     "Ensemble": "models.many",
     "FlexspineError": "errors",
+    "ForceFamily": "control.distribution",
     "Gait": "gaits.gait",
     "GaitMap": "studies.gait_map",
     "InputError": "errors",
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
     "Model": "models.model",
+    "Pace": "control.walking",
     "PinnedCheck": "studies.pinned_check",
     "Plan": "studies.plan",
     "Rerun": "studies.sweep",
     "ReturnMap": "gaits.return_map",
     "Robot": "models.robot",
+    "RobotRun": "models.robot_run",
     "Run": "models.simulation",
     "Search": "gaits.search",
+    "SpineComparison": "control.spine_comparison",
     "Stability": "gaits.stability",
     "Sweep": "studies.sweep",
+    "Trot": "control.trot",
+    "WalkSummary": "control.walk_measures",
     "animate": "report.animation",
     "basin_plan": "studies.basin",
     "check_pinned": "studies.pinned_check",
+    "compare_spines": "control.spine_comparison",
     "examine": "gaits.gait",
     "find_gaits": "gaits.search",
     "floquet_multipliers": "gaits.stability",
+    "force_family": "control.distribution",
     "load_gait": "gaits.files",
     "load_model": "models.presets",
     "load_robot": "models.robot_file",
     "map_plan": "studies.gait_map",
     "plot_basin": "report.basin_figure",
+    "plot_coordinates": "report.coordinates_figure",
     "plot_map": "report.map_figure",
     "plot_pinned": "report.pinned_figure",
+    "plot_robot": "report.robot_figure",
     "plot_run": "report.figure",
     "preset_names": "models.presets",
     "read_basins": "studies.basin",
     "read_map": "studies.gait_map",
     "read_plan": "studies.plan_file",
     "rerun": "studies.sweep",
+    "rhythm": "control.cpg",
+    "robot_dataset": "models.robot_run",
     "robot_names": "models.robot_file",
     "save_gait": "gaits.files",
     "simulate": "models.simulation",
     "simulate_many": "models.many",
+    "standing": "control.leg_function",
     "stream_many": "models.many",
     "stride_map": "gaits.return_map",
     "strip": "report.animation",
     "summarize": "gaits.measures",
+    "summarize_walk": "control.walk_measures",
     "sweep": "studies.sweep",
     "switch_branch": "gaits.switching",
     "to_dataset": "models.dataset",
     "trace_branch": "gaits.continuation",
+    "trot": "control.trot",
 }
 
 __all__ = [
+    "Aim",
     "Basin",
     "Branch",
+    "Cpg",
     "Ensemble",
     "FlexspineError",
+    "ForceFamily",
     "Gait",
     "GaitMap",
     "InputError",
     "Landmark",
     "MachineError",
     "Model",
+    "Pace",
     "PinnedCheck",
     "Plan",
     "Rerun",
     "ReturnMap",
     "Robot",
+    "RobotRun",
     "Run",
     "Search",
+    "SpineComparison",
     "Stability",
     "Sweep",
+    "Trot",
+    "WalkSummary",
     "__version__",
     "animate",
     "basin_plan",
     "check_pinned",
+    "compare_spines",
     "examine",
     "find_gaits",
     "floquet_multipliers",
+    "force_family",
     "load_gait",
     "load_model",
     "load_robot",
     "map_plan",
     "plot_basin",
+    "plot_coordinates",
     "plot_map",
     "plot_pinned",
+    "plot_robot",
     "plot_run",
     "preset_names",
     "read_basins",
     "read_map",
     "read_plan",
     "rerun",
+    "rhythm",
+    "robot_dataset",
     "robot_names",
     "save_gait",
     "simulate",
     "simulate_many",
+    "standing",
     "stream_many",
     "stride_map",
     "strip",
     "summarize",
+    "summarize_walk",
     "sweep",
     "switch_branch",
     "to_dataset",
     "trace_branch",
+    "trot",
 ]
 
 

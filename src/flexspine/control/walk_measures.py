@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexspine.errors import FlexspineError
 from flexspine.hybrid.compile import Array
 from flexspine.models.articulated import anchor
 from flexspine.models.robot_run import RobotRun, robot_dataset
@@ -53,8 +54,13 @@ class WalkSummary:
 
 
 def summarize_walk(run: RobotRun) -> WalkSummary:
-    """Measure a run of a robot that walks."""
+    """Measure a run of a robot that walks. Raises `FlexspineError` if it did not even begin."""
     dataset = robot_dataset(run, interval=INTERVAL)
+    if not dataset.sizes["time"]:
+        # No InputError: its exit code is that of a run that ended without its goal.
+        raise FlexspineError(
+            f"the run ended where it began: {run.outcome.message}", run.outcome.advice
+        )
     forces, stands = dataset["grf"].values, dataset["stands"].values > 0
     sliding = dataset["slides"].values != 0
     planned, anchors, step = _plan(run, dataset["time"].values)

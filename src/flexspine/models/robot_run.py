@@ -99,13 +99,15 @@ def robot_dataset(
     Dimensions are ``joint``, ``motor``, ``link``, ``foot_name`` and ``axis`` (x, y), all by name;
     `ROBOT_VARIABLES` tells what there is. ``footing`` names the feet on the ground. Events stand
     along ``event`` with ``event_time``, ``event_kind`` and ``event_impulse`` (N s by foot and
-    axis). Attributes carry parameters, settings, versions, tolerance and outcome. Raises
-    `ParameterError` for times that are not usable.
+    axis). Attributes carry parameters, settings, versions, tolerance and outcome. A run that ended
+    at its first instant has no samples. Raises `ParameterError` for times that are not usable.
     """
     import xarray as xr
 
     trajectory = run.trajectory
     grid = sample_times(trajectory, interval) if times is None else checked_times(trajectory, times)
+    if not trajectory.arcs:
+        grid = grid[:0]
     columns = _sample(run, grid)
     footings = columns.pop("footing")
     events, robot = run.events, run.robot
