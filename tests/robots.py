@@ -15,7 +15,7 @@ from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.trajectory import HybridState, Trajectory
 from flexspine.mechanics.linkage_motion import LinkageMotion
-from flexspine.models.articulated import BoundRobot
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.drive import Drive, Turning
 
 Array = NDArray[np.float64]

@@ -16,16 +16,8 @@ from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.trajectory import Event, Trajectory
 from flexspine.mechanics.complementarity import Contact
-from flexspine.models.articulated import (
-    DISSIPATED,
-    LOSS,
-    WORK,
-    BoundRobot,
-    Build,
-    Push,
-    articulated_system,
-    impulse,
-)
+from flexspine.models.articulated import DISSIPATED, LOSS, WORK, impulse
+from flexspine.models.bound_robot import BoundRobot, Push
 from flexspine.models.drive import Drive
 from flexspine.models.footing import Footing
 from tests.robot_by_scipy import Falling, Happening
@@ -499,7 +491,7 @@ def test_without_sliding_it_ends_where_contact_has_no_single_solution() -> None:
 def test_robots_of_one_build_share_their_equations() -> None:
     """A spine of another stiffness has the same ones, one without a spring has others."""
     soft, stiff, loose = (load_robot("sc618", {"spine.stiffness": k}) for k in (240.0, 500.0, 0.0))
-    systems = [articulated_system(Build.like(Drive(robot))) for robot in (soft, stiff, loose)]
+    systems = [BoundRobot(Drive(robot), 1e-12).system for robot in (soft, stiff, loose)]
     assert systems[0] is systems[1]
     assert systems[0] is not systems[2]
     for robot in (stiff, loose):

@@ -14,7 +14,8 @@ from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion
-from flexspine.models.articulated import CLOCK, BoundRobot
+from flexspine.models.articulated import CLOCK
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.drive import Drive, Moment, Turning
 
 NEXT_SAMPLE = sp.Symbol("next_sample", real=True)

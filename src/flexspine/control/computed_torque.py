@@ -21,7 +21,8 @@ from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion, Standing
 from flexspine.mechanics.linkage_tracking import follow
-from flexspine.models.articulated import BY, BoundRobot, anchor, stands_in
+from flexspine.models.articulated import BY, anchor, stands_in
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.drive import Moment, Turning
 from flexspine.models.footing import Footing
 

@@ -16,7 +16,7 @@ from flexspine.control.leg_function import LegFunction
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.trajectory import HybridState
-from flexspine.models.articulated import BoundRobot
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.drive import Moment
 from flexspine.models.leg_geometry import Leg, legs_of
 

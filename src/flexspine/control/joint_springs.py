@@ -11,7 +11,7 @@ from flexspine.control.walking import Walker
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion
-from flexspine.models.articulated import BoundRobot
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.drive import Turning
 
 STIFFNESS, DAMPING = sp.symbols("joint_stiffness joint_damping", real=True)

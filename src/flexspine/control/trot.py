@@ -17,7 +17,7 @@ from flexspine.control.walking import LONGEST, Pace, Walker, diagonal_pairs
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
-from flexspine.models.articulated import BoundRobot, Push
+from flexspine.models.bound_robot import BoundRobot, Push
 from flexspine.models.leg_geometry import legs_of
 from flexspine.models.model import TOLERANCES, check_between
 from flexspine.models.robot import Robot

@@ -31,7 +31,8 @@ from flexspine.hybrid.compile import Array, BoundSystem
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
-from flexspine.models.articulated import CLOCK, BoundRobot, anchor
+from flexspine.models.articulated import CLOCK, anchor
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.drive import Drive, Moment
 from flexspine.models.leg_geometry import Leg, legs_of
 from flexspine.models.robot import Robot

@@ -17,7 +17,7 @@ from flexspine.models.footing import Footing
 from flexspine.models.robot import Robot
 
 if TYPE_CHECKING:
-    from flexspine.models.articulated import BoundRobot
+    from flexspine.models.bound_robot import BoundRobot
 
 
 @dataclass(frozen=True)

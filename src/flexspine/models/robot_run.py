@@ -16,7 +16,8 @@ from flexspine._version import __version__
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.trajectory import Event, Trajectory
-from flexspine.models.articulated import DISSIPATED, LOSS, WORK, BoundRobot, impulse
+from flexspine.models.articulated import DISSIPATED, LOSS, WORK, impulse
+from flexspine.models.bound_robot import BoundRobot
 from flexspine.models.dataset import DEFAULT_INTERVAL, checked_times, sample_times
 from flexspine.models.footing import Footing, flags_of
 from flexspine.models.robot import Robot
