@@ -20,18 +20,23 @@ from functools import cached_property, lru_cache, partial
 import sympy as sp
 
 from flexspine.hybrid.compile import BoundSystem
-from flexspine.hybrid.outcome import Outcome
+from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard, HybridSystem, Mode, Section
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.complementarity import Contact
 from flexspine.mechanics.linkage_motion import LinkageMotion, MaybeStanding, Point, Standing
-from flexspine.models.bounder import FELL
 from flexspine.models.drive import Drive, Turning
 from flexspine.models.footing import Footing, flags_of
 from flexspine.models.robot import Robot
 
 CLOCK, WORK, DISSIPATED = sp.symbols("clock motor_work dissipated_energy", real=True)
 LOSS, PUSH_TIME = sp.symbols("impact_loss push_time", real=True)
+
+FELL = OutcomeKind(
+    "fell",
+    "without control a robot always falls; with it, walk more slowly, lower the hips, or allow "
+    "larger torques",
+)
 
 # The mode of all footings that have none of their own, and what leads to a drive's label.
 ANY = "any footing"
