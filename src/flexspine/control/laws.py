@@ -10,7 +10,7 @@ import daqp
 import numpy as np
 
 from flexspine.mechanics.linkage import Array, Linkage
-from flexspine.mechanics.stance import passive_forces, tracked
+from flexspine.mechanics.stance import equations, tracked
 
 # What daqp calls equations, inequalities, and a problem that it has solved.
 EQUATION, INEQUALITY = 5, 0
@@ -94,27 +94,13 @@ class LeastResidual(Tracking):
 
     def torques(self, now: Situation) -> Array:
         """The torques (m,)."""
-        linkage, n = now.linkage, now.linkage.size
-        motors = linkage.actuation
-        m, k = motors.shape[1], 2 * len(now.feet)
-        jacobian = linkage.foot_jacobian(now.q, now.feet)
-        size = n + m + k
+        still, right = equations(now.linkage, now.q, now.rates, now.feet)
+        count, size = still.shape
+        n, m, k = now.linkage.size, len(now.joints[0]), 2 * len(now.feet)
         moves = np.zeros((m, size))
-        moves[:, :n] = motors.T
-        wanted = self.wanted(now)
+        moves[:, :n] = now.linkage.actuation.T
         cost = moves.T @ moves
         cost[range(n, n + m), range(n, n + m)] += SMALL
-        equations = np.zeros((n + k, size))
-        equations[:n, :n] = linkage.mass_matrix(now.q)
-        equations[:n, n : n + m] = -motors
-        equations[:n, n + m :] = -jacobian.T
-        equations[n:, :n] = jacobian
-        right = np.concatenate(
-            [
-                -passive_forces(linkage, now.q, now.rates),
-                -linkage.foot_bias(now.q, now.rates, now.feet),
-            ]
-        )
         cones = np.zeros((k, size))
         for i in range(k // 2):
             t, f = n + m + 2 * i, n + m + 2 * i + 1
@@ -123,13 +109,19 @@ class LeastResidual(Tracking):
         bounds = np.zeros((m, size))
         bounds[range(m), range(n, n + m)] = 1.0
         limits = np.full(m, min(now.limit, BOUNDLESS))
-        rows = np.concatenate([equations, cones, bounds])
+        rows = np.concatenate([still, cones, bounds])
         upper = np.concatenate([right, np.full(k, BOUNDLESS), limits])
         lower = np.concatenate([right, np.zeros(k), -limits])
         sense = np.full(len(rows), INEQUALITY, dtype=np.intc)
-        sense[: n + k] = EQUATION
+        sense[:count] = EQUATION
         found, _, flag, _ = daqp.solve(
-            cost, -moves.T @ wanted, np.ascontiguousarray(rows), upper, lower, sense, eps_prox=1e-6
+            cost,
+            -moves.T @ self.wanted(now),
+            np.ascontiguousarray(rows),
+            upper,
+            lower,
+            sense,
+            eps_prox=1e-6,
         )
         if flag != SOLVED:
             raise np.linalg.LinAlgError("no torques within the limits keep the feet on the ground")
@@ -150,31 +142,16 @@ class SevenOutputs(Law):
 
     def torques(self, now: Situation) -> Array:
         """The torques (m,)."""
-        linkage, n = now.linkage, now.linkage.size
-        motors = linkage.actuation
-        m, k = motors.shape[1], 2 * len(now.feet)
-        jacobian = linkage.foot_jacobian(now.q, now.feet)
+        still, right = equations(now.linkage, now.q, now.rates, now.feet)
         outputs, wanted = self._outputs(now)
-        equal = np.zeros((1 if k == 4 else 0, n + m + k))
-        if k == 4:
-            equal[0, [n + m, n + m + 2]] = 1.0, -1.0
-        rows = len(outputs)
-        matrix = np.concatenate(
-            [
-                np.hstack([linkage.mass_matrix(now.q), -motors, -jacobian.T]),
-                np.hstack([jacobian, np.zeros((k, m + k))]),
-                np.hstack([outputs, np.zeros((rows, m + k))]),
-                equal,
-            ]
-        )
-        right = np.concatenate(
-            [
-                -passive_forces(linkage, now.q, now.rates),
-                -linkage.foot_bias(now.q, now.rates, now.feet),
-                wanted,
-                np.zeros(len(equal)),
-            ]
-        )
+        n, m, size = now.linkage.size, len(now.joints[0]), still.shape[1]
+        equal = np.zeros((int(len(now.feet) == 2), size))
+        for row in equal:
+            row[[n + m, n + m + 2]] = 1.0, -1.0
+        rows = np.zeros((len(outputs), size))
+        rows[:, :n] = outputs
+        matrix = np.concatenate([still, rows, equal])
+        right = np.concatenate([right, wanted, np.zeros(len(equal))])
         if matrix.shape[0] == matrix.shape[1]:
             found = np.linalg.solve(matrix, right)
         else:

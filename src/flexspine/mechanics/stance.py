@@ -41,6 +41,22 @@ def passive_forces(linkage: Linkage, q: Array, rates: Array) -> Array:
     return linkage.velocity_forces(q, rates) + still
 
 
+def equations(linkage: Linkage, q: Array, rates: Array, feet: Sequence[str]) -> tuple[Array, Array]:
+    """Motion with feet that stay where they are, as equations: rows and right sides.
+
+    Rows have shape (N + 2k, N + m + 2k), for accelerations (N,), torques (m,) and forces, x and y
+    of each foot in turn; the first N of them are the equations of motion.
+    """
+    n, jacobian = linkage.size, linkage.foot_jacobian(q, feet)
+    motors = linkage.actuation
+    m, k = motors.shape[1], len(jacobian)
+    rows = np.zeros((n + k, n + m + k))
+    rows[:n, :n], rows[:n, n : n + m] = linkage.mass_matrix(q), -motors
+    rows[:n, n + m :], rows[n:, :n] = -jacobian.T, jacobian
+    bias = linkage.foot_bias(q, rates, feet)
+    return rows, -np.concatenate([passive_forces(linkage, q, rates), bias])
+
+
 def constrained(
     linkage: Linkage, q: Array, rates: Array, feet: Sequence[str], torques: Array
 ) -> Motion:
@@ -48,10 +64,10 @@ def constrained(
 
     Raises `numpy.linalg.LinAlgError` where the feet are not independent.
     """
-    n = linkage.size
-    jacobian = linkage.foot_jacobian(q, feet)
-    applied = linkage.actuation @ torques - passive_forces(linkage, q, rates)
-    solved = _solve(linkage, q, jacobian, applied, -linkage.foot_bias(q, rates, feet))
+    n, (rows, right) = linkage.size, equations(linkage, q, rates, feet)
+    motors = slice(n, n + len(torques))
+    known = right - rows[:, motors] @ torques
+    solved = _solve(np.delete(rows, motors, axis=1), known)
     return Motion(solved[:n], solved[n:].reshape(-1, 2))
 
 
@@ -63,15 +79,18 @@ def tracked(
     Regular with no foot, one foot or two feet of different hips, unless the toes and a passive
     joint are in line. Raises `numpy.linalg.LinAlgError` elsewhere.
     """
-    n, motors, k = linkage.size, linkage.actuation.T, 2 * len(feet)
-    held = np.concatenate([linkage.foot_jacobian(q, feet), motors])
-    needed = np.concatenate([-linkage.foot_bias(q, rates, feet), wanted])
-    if len(held) > n:
+    n, m = linkage.size, len(wanted)
+    if 2 * len(feet) + m > n:
         raise np.linalg.LinAlgError(TOO_MUCH)
-    solved = _solve(linkage, q, held, -passive_forces(linkage, q, rates), needed)
-    if not np.abs(held @ solved[:n] - needed).max() <= UNSOLVED * (1 + np.abs(needed).max()):
+    rows, right = equations(linkage, q, rates, feet)
+    tracking = np.zeros((m, rows.shape[1]))
+    tracking[:, :n] = linkage.actuation.T
+    matrix, needed = np.concatenate([rows, tracking]), np.concatenate([right, wanted])
+    solved = _solve(matrix, needed)
+    missed = np.abs(matrix @ solved - needed)[n:].max(initial=0.0)
+    if not missed <= UNSOLVED * (1 + np.abs(needed[n:]).max(initial=0.0)):
         raise np.linalg.LinAlgError(TOO_MUCH)
-    return Tracked(solved[:n], solved[n : n + k].reshape(-1, 2), solved[n + k :])
+    return Tracked(solved[:n], solved[n + m :].reshape(-1, 2), solved[n : n + m])
 
 
 def supported(
@@ -105,12 +124,10 @@ def stopped(linkage: Linkage, q: Array, rates: Array, rows: Array) -> Array:
     return np.asarray(rates - spread @ pushes, dtype=float)
 
 
-def _solve(linkage: Linkage, q: Array, held: Array, applied: Array, needed: Array) -> Array:
-    """Accelerations with ``held q'' = needed`` and the forces along ``held`` for them."""
-    count = len(held)
-    matrix = np.block([[linkage.mass_matrix(q), -held.T], [held, np.zeros((count, count))]])
+def _solve(matrix: Array, right: Array) -> Array:
+    """What a square matrix makes this right side of."""
     try:
-        solved = np.linalg.solve(matrix, np.concatenate([applied, needed]))
+        solved = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
         raise np.linalg.LinAlgError(TOO_MUCH) from None
     return np.asarray(solved, dtype=float)
