@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -11,11 +10,14 @@ import typer
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_PRESET,
+    Animation,
     Apex,
     Assignments,
     GaitFile,
     Json,
     Preset,
+    RunDirectory,
+    Tolerance,
     Touchdown,
     assignments,
 )
@@ -36,19 +38,13 @@ def bound(
     duration: Annotated[
         float | None, typer.Option(help="Run this many seconds instead of counting strides.")
     ] = None,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Tolerance of the integrator (default 1e-12).")
-    ] = None,
+    tolerance: Tolerance = None,
     interval: Annotated[
         float | None,
         typer.Option(help="Seconds between samples in the written data (default 0.001)."),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Write data, figures and animations into this directory.")
-    ] = None,
-    animation: Annotated[
-        bool, typer.Option("--animation/--no-animation", help="Make animations with --out.")
-    ] = True,
+    out: RunDirectory = None,
+    animation: Animation = True,
     json: Json = False,
 ) -> int:
     """Simulate bounding from an apex, or a saved gait.

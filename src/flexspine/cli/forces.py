@@ -8,9 +8,15 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import Assignments, Json, assignments, numbers
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Assignments,
+    Json,
+    RobotName,
+    assignments,
+    numbers,
+)
 from flexspine.cli.output import print_json
-from flexspine.cli.trot import DEFAULT_ROBOT, RobotName
 from flexspine.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -142,9 +148,7 @@ def _record(
         },
         "torques": None
         if torques is None
-        else dict(
-            zip((n for n, (_, m) in robot.joints.items() if m), torques.tolist(), strict=True)
-        ),
+        else dict(zip(robot.motors, torques.tolist(), strict=True)),
     }
 
 

@@ -11,12 +11,17 @@ import typer
 from flexspine.errors import InputError, ParameterError
 
 DEFAULT_PRESET = "kamimura2015-flexible"
+DEFAULT_ROBOT = "sc618"
 
 Preset = Annotated[
     str | None,
     typer.Option(
         help=f"A preset (see 'flexspine presets') or a TOML file (default {DEFAULT_PRESET})."
     ),
+]
+RobotName = Annotated[
+    str,
+    typer.Option("--robot", help=f"A robot ({DEFAULT_ROBOT}) or a TOML file that describes one."),
 ]
 GaitFile = Annotated[
     Path | None,
@@ -30,6 +35,15 @@ Symmetric = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+Tolerance = Annotated[
+    float | None, typer.Option(help="Tolerance of the integrator (default 1e-12).")
+]
+RunDirectory = Annotated[
+    Path | None, typer.Option(help="Write data, figures and animations into this directory.")
+]
+Animation = Annotated[
+    bool, typer.Option("--animation/--no-animation", help="Make animations with --out.")
+]
 Assignments = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter, e.g. spine.stiffness=240."),

@@ -11,25 +11,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import Json, numbers
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Animation,
+    Json,
+    RobotName,
+    RunDirectory,
+    Tolerance,
+    numbers,
+)
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from flexspine.control.spine_comparison import SpineComparison
     from flexspine.control.walk_measures import WalkSummary
-    from flexspine.control.walking import Pace
+    from flexspine.control.walk_plan import Pace
     from flexspine.models.robot_run import RobotRun
 
-DEFAULT_ROBOT = "sc618"
 OF_GAIT = "gait."
 
 # What a trot writes, in which an earlier one's pictures would pass for its own.
 PICTURES = re.compile(r"(figure|animation|comparison)\.(png|mp4|gif|csv)")
 
-RobotName = Annotated[
-    str, typer.Option("--robot", help="A robot (sc618) or a TOML file that describes one.")
-]
 RobotAssignments = Annotated[
     list[str] | None,
     typer.Option(
@@ -71,15 +75,9 @@ def trot(
             "--compare", help="Flexible and locked spine side by side, by controllers com and pd."
         ),
     ] = False,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Tolerance of the integrator (default 1e-12).")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Write data, figures and animations into this directory.")
-    ] = None,
-    animation: Annotated[
-        bool, typer.Option("--animation/--no-animation", help="Make animations with --out.")
-    ] = True,
+    tolerance: Tolerance = None,
+    out: RunDirectory = None,
+    animation: Animation = True,
     json: Json = False,
 ) -> int:
     """Let the articulated robot trot from standing, with a flexible spine.
@@ -152,7 +150,7 @@ def _gait(given: Mapping[str, float]) -> Pace:
     """The gait with some numbers changed. Raises `UnknownNameError`."""
     from dataclasses import fields
 
-    from flexspine.control.walking import Pace
+    from flexspine.control.walk_plan import Pace
 
     known = [each.name for each in fields(Pace)]
     for name in given:

@@ -11,7 +11,7 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import Assignments, Json, assignments
+from flexspine.cli.options import DEFAULT_ROBOT, Assignments, Json, RobotName, assignments
 from flexspine.cli.output import Steps, print_json, steps
 
 if TYPE_CHECKING:
@@ -27,9 +27,7 @@ def _group() -> None:
 
 @app.command("pinned")
 def pinned(
-    robot: Annotated[
-        str, typer.Option(help="A robot or a TOML file that describes one.")
-    ] = "sc618",
+    robot: RobotName = DEFAULT_ROBOT,
     foot: Annotated[
         str | None, typer.Option(help="The foot that is pinned (default: the robot's first).")
     ] = None,
