@@ -30,16 +30,15 @@ class Steady(Drive):
     torques: Mapping[str, float] = field(default_factory=dict)
 
     def _symbols(self) -> dict[str, sp.Symbol]:
-        motors = [joint for joint, (_, motor) in self.robot.joints.items() if motor]
-        return {joint: sp.Symbol(f"steady_{joint}", real=True) for joint in motors}
+        return {joint: sp.Symbol(f"steady_{joint}", real=True) for joint in self.robot.motors}
 
     def values(self) -> dict[sp.Symbol, float]:
         return {s: self.torques.get(joint, 0.0) for joint, s in self._symbols().items()}
 
-    def turning(self, motion: LinkageMotion, mode: str) -> Turning:  # noqa: ARG002
+    def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         return Turning(self._symbols())
 
-    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:  # noqa: ARG002
+    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
         return np.array(list(self.values().values()))
 
 
@@ -60,7 +59,7 @@ def fallen_from(
 ) -> tuple[BoundRobot, Trajectory]:
     """A run from these coordinates; feet on the ground are at rest."""
     bound = BoundRobot(drive, TOLERANCE, **options)
-    start = bound.carry_on(bound.stand(q, rates, {}), bound.at_rest(q))
+    start = bound.begin(q, rates, {})
     assert not isinstance(start, Outcome)
     return bound, integrate(bound, start, end_time=seconds, record=True)
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flexspine.control.spine_comparison import SpineComparison, compare_spines
     from flexspine.control.trot import Trot, trot
     from flexspine.control.walk_measures import WalkSummary, summarize_walk
-    from flexspine.control.walking import Pace
+    from flexspine.control.walk_plan import Pace
     from flexspine.errors import FlexspineError, InputError, MachineError
     from flexspine.gaits.continuation import Branch, trace_branch
     from flexspine.gaits.files import load_gait, save_gait
@@ -63,7 +63,7 @@ _HOMES = {
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
     "Model": "models.model",
-    "Pace": "control.walking",
+    "Pace": "control.walk_plan",
     "PinnedCheck": "studies.pinned_check",
     "Plan": "studies.plan",
     "Rerun": "studies.sweep",

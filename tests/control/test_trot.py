@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from flexspine import load_robot
 from flexspine.control.trot import Trot, trot
-from flexspine.control.walking import Pace
+from flexspine.control.walk_plan import Pace
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.trajectory import Arc
 from flexspine.mechanics.stance import passive_forces

@@ -17,8 +17,8 @@ from scipy.integrate import simpson
 from flexspine import load_robot
 from flexspine.control.trot import Trot, trot
 from flexspine.control.walk_measures import WalkSummary, summarize_walk
+from flexspine.control.walk_plan import Pace
 from flexspine.control.walk_record import walk_record
-from flexspine.control.walking import Pace
 from flexspine.models.robot_run import RobotRun, robot_dataset
 from tests.control import own_walk as own
 

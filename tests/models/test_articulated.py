@@ -478,7 +478,7 @@ def test_without_sliding_it_ends_where_contact_has_no_single_solution() -> None:
         if other.next(q, rates, feet[:1])[1] != {feet[0]: 0}:
             continue  # it would lift off or slide
         wanted = names.get(solutions(robot, q, rates, feet), "ambiguous_contact")
-        start = bound.carry_on(bound.stand(q, rates, {}), bound.at_rest(q))
+        start = bound.begin(q, rates, {})
         assert not isinstance(start, Outcome)
         run = integrate(bound, start, end_time=1.2e-7, record=True)
         assert run.outcome.name == wanted

@@ -87,8 +87,7 @@ class Clocked(Drive):
     @cached_property
     def held_torques(self) -> dict[str, sp.Symbol]:
         """The symbols of the torques, by joint."""
-        motors = [joint for joint, (_, motor) in self.robot.joints.items() if motor]
-        return {joint: sp.Symbol(f"held_torque_{joint}", real=True) for joint in motors}
+        return {joint: sp.Symbol(f"held_torque_{joint}", real=True) for joint in self.robot.motors}
 
 
 def _sampled(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:

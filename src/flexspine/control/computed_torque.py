@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
+from flexspine.control.laws import Tracking
 from flexspine.control.references import References
 from flexspine.control.walking import Walker
 from flexspine.hybrid.compile import Array
@@ -39,22 +40,14 @@ SINGULAR = OutcomeKind(
 
 
 @dataclass(frozen=True)
-class Gains:
-    """``K_p`` in 1/s^2 and ``K_d`` in 1/s."""
-
-    stiffness: float = 400.0
-    damping: float = 40.0
-
-
-@dataclass(frozen=True)
 class ComputedTorque(Walker):
     """Walk with joints that follow their references without delay."""
 
-    gains: Gains = field(default_factory=Gains)
+    law: Tracking = field(default_factory=Tracking)
 
     def values(self) -> dict[sp.Symbol, float]:
-        """The gains, and what the legs measure."""
-        own = {STIFFNESS: self.gains.stiffness, DAMPING: self.gains.damping}
+        """The law's stiffness and damping, and what the legs measure."""
+        own = {STIFFNESS: self.law.stiffness, DAMPING: self.law.damping}
         return super().values() | own
 
     def label(self, moment: Moment) -> str:
@@ -86,7 +79,7 @@ class ComputedTorque(Walker):
         """The torques, from where the law knows them."""
         counted = Footing.sticking_on(self.to_stand(bound.moment(point).held)).name
         found = bound.observe(counted, point.states[None], point.held)
-        return np.array([found[f"torque_{joint}"][0] for joint in self.motors])
+        return np.array([found[f"torque_{joint}"][0] for joint in self.robot.motors])
 
 
 def wanted_accelerations(references: References, motion: LinkageMotion) -> dict[str, sp.Expr]:

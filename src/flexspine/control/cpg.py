@@ -16,7 +16,7 @@ from math import inf, pi
 
 import numpy as np
 
-from flexspine.control.walking import diagonal_pairs, hip_pairs
+from flexspine.control.leg_pairs import diagonal_pairs, hip_pairs
 from flexspine.errors import UnknownNameError
 from flexspine.hybrid.compile import Array
 from flexspine.models.leg_geometry import Leg

@@ -23,22 +23,12 @@ from flexspine.models.leg_geometry import Leg, legs_of
 AMPLITUDE, AMPLITUDE_RATE = sp.symbols("cpg_amplitude cpg_amplitude_rate", real=True)
 
 
-def _symbol(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
-
-
 @dataclass(frozen=True)
 class CpgDriven(Clocked):
     """Step by the rhythm of oscillators, without sense of the ground."""
 
-    cpg: Cpg | None = None
+    pattern: Cpg = field(kw_only=True)
     springs: JointSprings = field(default_factory=JointSprings)
-
-    @property
-    def pattern(self) -> Cpg:
-        """The oscillators."""
-        assert self.cpg is not None
-        return self.cpg
 
     @cached_property
     def legs(self) -> dict[str, Leg]:
@@ -85,7 +75,7 @@ class CpgDriven(Clocked):
         held = dict.fromkeys(self.held(), 0.0) | dict(zip(self._beat_symbols, numbers, strict=True))
         place, _ = self.pattern.feet(beat)
         q = self._function.posture(place + self._hips)
-        return bound.carry_on(self.ready(bound.stand(q, np.zeros_like(q), held)), bound.at_rest(q))
+        return bound.begin(q, np.zeros_like(q), held)
 
     @cached_property
     def _hips(self) -> Array:
@@ -98,12 +88,14 @@ class CpgDriven(Clocked):
 
     @cached_property
     def _beat_symbols(self) -> tuple[sp.Symbol, ...]:
-        phases = (_symbol(f"cpg_phase_{leg}") for leg in self.legs)
+        phases = (sp.Symbol(f"cpg_phase_{leg}", real=True) for leg in self.legs)
         return (*phases, AMPLITUDE, AMPLITUDE_RATE)
 
     @cached_property
     def _angles(self) -> dict[str, sp.Symbol]:
-        return {joint: _symbol(f"held_reference_{joint}") for joint in self.held_torques}
+        return {
+            joint: sp.Symbol(f"held_reference_{joint}", real=True) for joint in self.robot.motors
+        }
 
     @cached_property
     def _function(self) -> LegFunction:

@@ -33,8 +33,7 @@ class LegFunction:
             inputs += [*place, *velocity]
         self._inputs, self._measures = inputs, leg_numbers(legs)
         found = references(robot, legs, (still, still, still), feet)
-        motors = [joint for joint, (_, motor) in robot.joints.items() if motor]
-        self._function = ReferenceFunction(found, motors, [*self._measures, *inputs])
+        self._function = ReferenceFunction(found, robot.motors, [*self._measures, *inputs])
 
     def joints(self, place: Array, velocity: Array) -> tuple[Array, Array]:
         """Angles of the motors' joints and their rates, shape (m,)."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -54,10 +55,18 @@ class BodyCourse:
 
     def motion(self) -> Course:
         """Place, velocity and acceleration."""
-        since = CLOCK - self.start
-        x = self.x + self.speed * since + self.gain * since**2 / 2
-        place = sp.Matrix([x, self.height])
-        return place, place.diff(CLOCK), place.diff(CLOCK, 2)
+        x, speed = _evenly(self.x, self.speed, self.gain, CLOCK - self.start)
+        return sp.Matrix([x, self.height]), sp.Matrix([speed, 0]), sp.Matrix([self.gain, 0])
+
+    def at(self, held: Mapping[sp.Symbol, float], time: float) -> tuple[float, float]:
+        """Place along x and speed at a time, in numbers."""
+        since = time - held[self.start]
+        return _evenly(held[self.x], held[self.speed], held[self.gain], since)
+
+
+def _evenly(x: Any, speed: Any, gain: Any, since: Any) -> tuple[Any, Any]:
+    """Place and speed under an even gain in speed, in symbols or in numbers."""
+    return x + speed * since + gain * since**2 / 2, speed + gain * since
 
 
 @dataclass(frozen=True)

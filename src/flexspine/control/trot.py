@@ -7,13 +7,15 @@ from dataclasses import dataclass, field, fields, replace
 from math import inf
 
 from flexspine.control.clocked import Clocked
-from flexspine.control.computed_torque import ComputedTorque, Gains
+from flexspine.control.computed_torque import ComputedTorque
 from flexspine.control.cpg import Cpg, rhythm
 from flexspine.control.cpg_driven import CpgDriven
 from flexspine.control.joint_springs import SpringDriven
 from flexspine.control.laws import JointSprings, Law, LeastResidual, SevenOutputs, Tracking
+from flexspine.control.leg_pairs import diagonal_pairs
 from flexspine.control.sampled import Sampled
-from flexspine.control.walking import LONGEST, Pace, Walker, diagonal_pairs
+from flexspine.control.walk_plan import Pace
+from flexspine.control.walking import LONGEST, Walker
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
@@ -123,15 +125,15 @@ def driven(robot: Robot, asked: Trot) -> Walker | CpgDriven:
     if asked.controller == OSCILLATORS:
         assert rate is not None
         springs, cpg = JointSprings(**gains), _oscillators(robot, asked.gait)
-        made = CpgDriven(robot, rate=rate, limit=limit, springs=springs, cpg=cpg)
+        made = CpgDriven(robot, rate=rate, limit=limit, springs=springs, pattern=cpg)
     elif rate is not None:
         law = LAWS[asked.controller](**gains)
         made = Sampled(robot, gait=asked.gait, law=law, rate=rate, limit=limit)
     elif asked.controller == JointSprings.name:
         made = SpringDriven(robot, asked.gait, springs=JointSprings(**gains))
     else:
-        made = ComputedTorque(robot, asked.gait, gains=Gains(**gains))
-        if robot.linkage.size - len(made.motors) < 4:
+        made = ComputedTorque(robot, asked.gait, law=Tracking(**gains))
+        if robot.linkage.size - len(robot.motors) < 4:
             raise ParameterError(
                 "tracking all joints is overdetermined on two feet, as no joint is without a motor",
                 "take the controller qp, com, pd or cpg",

@@ -119,8 +119,15 @@ class BoundRobot(BoundSystem):
         label = self.drive.label(moment)
         return (footing.name if usual else ANY) + (BY + label if label else "")
 
-    def stand(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> Moment:
-        """The beginning of time; feet within rounding error of the ground are on it."""
+    def begin(
+        self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]
+    ) -> HybridState | Outcome:
+        """The beginning of a run; feet within rounding error of the ground are on it."""
+        start = self.drive.ready(self._stand(q, rates, held))
+        angles, still = self.linkage.to_absolute @ q, np.zeros(len(q) + 3)
+        return self.carry_on(start, np.concatenate([angles, still]))
+
+    def _stand(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> Moment:
         linkage = self.linkage
         places = {foot: linkage.foot(q, foot) for foot in self.robot.feet}
         low = [foot for foot, (_, y) in places.items() if abs(y) <= GROUND]
@@ -129,11 +136,6 @@ class BoundRobot(BoundSystem):
             values[anchor(foot)[0]] = float(place[0])
         footing = Footing.of(dict.fromkeys(low, Contact.STICK), self.robot.feet)
         return Moment(0.0, q, rates, footing, {**values, **held})
-
-    def at_rest(self, q: Array) -> Array:
-        """All that flows, at rest with these coordinates."""
-        n = self.linkage.size
-        return np.concatenate([self.linkage.to_absolute @ q, np.zeros(n + 3)])
 
     def carry_on(self, moment: Moment, states: Array) -> HybridState | Outcome:
         """Go on after something jumped: find out what each touching foot does next."""
@@ -227,8 +229,8 @@ def _landed(foot: str, bound: BoundSystem, point: HybridState) -> Decided:
             above = linkage.foot(moment.q, other)[1] - moment.held[floor(other)]
             if rise < 0 and above <= -rise * TOGETHER:
                 down[other] = rise
-    touching = [each for each in robot.robot.feet if each in {*down, *moment.footing.feet}]
-    return _hit(robot, moment, point.states, touching, moment.rates, tuple(down))
+    feet = [each for each in robot.robot.feet if each in {*down, *moment.footing.feet}]
+    return _hit(robot, moment, point.states, feet, moment.rates, tuple(down))
 
 
 def _pushed(bound: BoundSystem, point: HybridState) -> Decided:

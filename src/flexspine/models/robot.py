@@ -106,6 +106,11 @@ class Robot:
             self.numbers["gravity"],
         )
 
+    @cached_property
+    def motors(self) -> tuple[str, ...]:
+        """The joints with a motor, in order."""
+        return tuple(joint for joint, (_, motor) in self.joints.items() if motor)
+
     @property
     def friction(self) -> float:
         """The coefficient of Coulomb friction of feet on the ground."""

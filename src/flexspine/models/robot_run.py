@@ -127,7 +127,7 @@ def robot_dataset(
         coords={
             "time": ("time", grid, {"units": "s", "long_name": "time"}),
             "joint": list(robot.joints),
-            "motor": [name for name, (_, motor) in robot.joints.items() if motor],
+            "motor": list(robot.motors),
             "link": list(robot.parents),
             "foot_name": list(robot.feet),
             "axis": ["x", "y"],
@@ -154,7 +154,6 @@ def _sample(run: RobotRun, times: Array) -> dict[str, Any]:
     flags = {foot: [held[:, system.places[f]] for f in flags_of(foot)] for foot in robot.feet}
     q, rates = states[:, :n] @ linkage.to_relative.T, states[:, n : 2 * n] @ linkage.to_relative.T
     places = [linkage.place[joint] for joint in robot.joints]
-    motors = [name for name, (_, motor) in robot.joints.items() if motor]
     starts = [linkage.point(q, link.name, 0.0) for link in linkage.links]
     ends = [linkage.point(q, link.name, link.length) for link in linkage.links]
     forces = [_table(seen, f"force_{axis}", robot.feet, count) for axis in "xy"]
@@ -163,7 +162,7 @@ def _sample(run: RobotRun, times: Array) -> dict[str, Any]:
         "com_rate": (linkage.com_jacobian(q) @ rates[..., None])[..., 0],
         "angle": q[:, places],
         "angle_rate": rates[:, places],
-        "torque": _table(seen, "torque", motors, count),
+        "torque": _table(seen, "torque", robot.motors, count),
         "link_angle": linkage.angles(q),
         "link_start": np.stack(starts, axis=1),
         "link_end": np.stack(ends, axis=1),
@@ -179,8 +178,8 @@ def _sample(run: RobotRun, times: Array) -> dict[str, Any]:
         "footing": np.array([_footing_name(row) for row in _rows(flags)], dtype=object),
     }
     for kind in ("reference", "reference_rate"):
-        if all(f"{kind}_{joint}" in seen for joint in motors):
-            found[kind] = _table(seen, kind, motors, count)
+        if all(f"{kind}_{joint}" in seen for joint in robot.motors):
+            found[kind] = _table(seen, kind, robot.motors, count)
     trunk = sorted({linkage.place[leg.trunk] for leg in robot.legs.values()})
     if trunk:
         found["trunk_pitch"] = found["link_angle"][:, trunk].mean(axis=1)

@@ -25,6 +25,7 @@ from flexspine.studies.pinned_check import ALLOWED, COMPARED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.typing import HashableList
 
     from flexspine.studies.pinned_check import PinnedCase, PinnedCheck
 
@@ -54,13 +55,16 @@ def plot_pinned(check: PinnedCheck) -> Figure:
     count = len(check.cases)
     with themed():
         details = _details(check)
-        rows = [[f"{row} {i}" for i in range(count)] for row in range(len(over_time))]
-        last = ["steps", "postures"] if count > 1 else ["steps"]
-        layout = [*rows, last, *([] if count > 1 else [["postures"]])]
+        layout: list[HashableList[str]] = [
+            [f"{row} {i}" for i in range(count)] for row in range(len(over_time))
+        ]
+        layout.append(["steps", "postures"] if count > 1 else ["steps"])
+        if count == 1:
+            layout.append(["postures"])
         height = ROW * len(layout) + 0.4 + LINE * len(details)
         width = WIDTH if count > 1 else WIDTH * 0.7
         figure = Figure(figsize=(width, height))
-        panels: dict[str, Axes] = figure.subplot_mosaic(layout)  # type: ignore[arg-type]
+        panels: dict[str, Axes] = figure.subplot_mosaic(layout)
         for i, case in enumerate(check.cases):
             for row, draw in enumerate(over_time):
                 axes = panels[f"{row} {i}"]

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexspine.control.computed_torque import Gains
 from flexspine.control.distribution import force_family
+from flexspine.control.laws import Tracking
 from flexspine.control.leg_function import standing
 from flexspine.control.trot import Trot, trot
 from flexspine.control.walk_measures import summarize_walk
@@ -70,7 +70,7 @@ def _equations(robot: Robot) -> Verdict:
 def _tracking(robot: Robot) -> Verdict:
     claim = "the tracking error decays exponentially"
     pushed = Trot(seconds=SECONDS, push=PUSH, push_time=PUSH_TIME)
-    off, largest, phases = _off_exponential(trot(robot, pushed), Gains())
+    off, largest, phases = _off_exponential(trot(robot, pushed), Tracking())
     held = summarize_walk(trot(robot, Trot(seconds=SECONDS, rate=400.0)))
     exponential = off <= EXPONENTIAL
     finding = (
@@ -84,7 +84,7 @@ def _tracking(robot: Robot) -> Verdict:
     return Verdict(11, claim, verdict, finding, numbers, command="flexspine trot --push 1")
 
 
-def _off_exponential(run: RobotRun, gains: Gains) -> tuple[float, float, int]:
+def _off_exponential(run: RobotRun, law: Tracking) -> tuple[float, float, int]:
     """How far errors are off their exponentials, how large they get, in rad, in how many phases."""
     off, largest, phases = 0.0, 0.0, 0
     for start, end in pairwise(event.time for event in run.events):
@@ -95,8 +95,8 @@ def _off_exponential(run: RobotRun, gains: Gains) -> tuple[float, float, int]:
         motors = found["motor"].values
         error = found["angle"].sel(joint=motors).values - found["reference"].values
         rates = found["angle_rate"].sel(joint=motors).values - found["reference_rate"].values
-        decay, since = gains.damping / 2, (times - start)[:, None]
-        assert decay**2 == gains.stiffness  # critically damped
+        decay, since = law.damping / 2, (times - start)[:, None]
+        assert decay**2 == law.stiffness  # critically damped
         expected = (error[0] + (rates[0] + decay * error[0]) * since) * np.exp(-decay * since)
         off = max(off, float(np.abs(error - expected).max()))
         largest, phases = max(largest, float(np.abs(error).max())), phases + 1
