@@ -14,8 +14,7 @@ import pytest
 
 from flexspine import examine, load_model, save_gait
 from flexspine.cli import app
-from tests.cli.conftest import Cli
-from tests.cli.test_gait import COMMAND
+from tests.cli.conftest import COMMAND, Cli
 
 ONE = ("--processes", "1")
 SMALL_BASIN = ("basin", "--preset", "scout2", "--points", "6", "--strides", "60", *ONE)

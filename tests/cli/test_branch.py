@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from flexspine.report.branch_figure import plot_branch
-from tests.cli.conftest import Cli
-from tests.cli.test_gait import COMMAND, FIELDS, Found, assert_one_clear_line
+from tests.cli.conftest import COMMAND, Cli
+from tests.cli.test_gait import FIELDS, Found, assert_one_clear_line
 
 RANGE = ("--from", "3.7", "--to", "4.6")
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 
-from tests.cli.conftest import Cli, Result
-
-COMMAND = Path(sys.executable).with_name("flexspine")
+from tests.cli.conftest import COMMAND, Cli, Result
 
 FIELDS = {
     "schema_version",

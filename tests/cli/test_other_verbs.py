@@ -56,19 +56,19 @@ def test_equations_of_nothing_are_refused(cli: Cli, arguments: list[str]) -> Non
     assert done.stderr.count("\n") == 1
 
 
-def test_equations_print_where_unicode_cannot(cli: Cli) -> None:
-    done = cli("equations", "rigid-bounder", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+def test_equations_print_where_unicode_cannot(command: Cli) -> None:
+    done = command("equations", "rigid-bounder", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
     assert done.returncode == 0
     assert done.stdout.isascii()
 
 
-def test_the_cache_can_be_cleared(cli: Cli, tmp_path: Path) -> None:
+def test_the_cache_can_be_cleared(command: Cli, tmp_path: Path) -> None:
     own = str(tmp_path / "cache")
-    assert cli("bound", "--json", FLEXSPINE_CACHE_DIR=own).returncode == 0
-    cleared = json.loads(cli("cache", "clear", "--json", FLEXSPINE_CACHE_DIR=own).stdout)
+    assert command("bound", "--json", FLEXSPINE_CACHE_DIR=own).returncode == 0
+    cleared = json.loads(command("cache", "clear", "--json", FLEXSPINE_CACHE_DIR=own).stdout)
     assert cleared["freed_bytes"] > 100_000
     assert list((tmp_path / "cache").iterdir()) == []
-    assert cli("cache", "clear", FLEXSPINE_CACHE_DIR=own).returncode == 0
+    assert command("cache", "clear", FLEXSPINE_CACHE_DIR=own).returncode == 0
 
 
 def test_help_has_an_example_for_every_verb(cli: Cli) -> None:

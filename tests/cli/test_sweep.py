@@ -19,8 +19,7 @@ import pytest
 
 import flexspine
 from flexspine.cli import app
-from tests.cli.conftest import Cli
-from tests.cli.test_gait import COMMAND
+from tests.cli.conftest import COMMAND, Cli
 from tests.studies.test_plan import BAD
 
 PLAN = """model = ["scout2", "kamimura2015-flexible"]

@@ -6,13 +6,12 @@ import csv
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from tests.cli.conftest import Cli
+from tests.cli.conftest import COMMAND, Cli
 
 FIELDS = {
     "schema_version", "robot", "outcome", "message", "advice", "duration", "settings", "spine",
@@ -184,7 +183,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """What is printed and written by a comparison, which is made once for all tests."""
     folder = tmp_path_factory.mktemp("compared")
     done = subprocess.run(
-        [Path(sys.executable).with_name("flexspine"),
+        [COMMAND,
          "trot", "--compare", "--seconds", "2", "--out", "spines"],
         cwd=folder, env=dict(os.environ), capture_output=True, text=True, timeout=300,
     )  # fmt: skip
