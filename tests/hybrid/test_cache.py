@@ -13,7 +13,7 @@ import pytest
 
 PROGRAM = """
 from flexspine import load_model, simulate
-print(simulate(load_model("slip")).apexes[-1]["height"])
+print(simulate(load_model("slip"), duration=0.01).trajectory.end.states[1])
 """
 
 
@@ -50,7 +50,7 @@ def files(cache: Path) -> dict[str, int]:
 def test_a_second_start_finds_what_the_first_compiled(tmp_path: Path) -> None:
     first = run_with(tmp_path)
     compiled = entries(tmp_path)
-    assert compiled > 5
+    assert compiled > 2
     assert run_with(tmp_path) == first
     assert entries(tmp_path) == compiled
 

@@ -80,7 +80,7 @@ def check(preset: str, changes: dict[str, Any], apex: dict[str, float], angles: 
         assert np.all(np.isfinite(run.trajectory.end.states))
 
 
-@settings(max_examples=2500)
+@settings(max_examples=1200)
 @given(sane())
 def test_sane_bounders_always_end_in_an_outcome(
     case: tuple[str, dict[str, Any], dict[str, float], dict[str, float]],
@@ -88,7 +88,7 @@ def test_sane_bounders_always_end_in_an_outcome(
     check(*case)
 
 
-@settings(max_examples=1000)
+@settings(max_examples=500)
 @given(st.data())
 def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) -> None:
     """Within the bounds that the parameters declare, and beyond them."""
@@ -105,7 +105,7 @@ def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) 
     check(model.name, changes, apex, angles)
 
 
-@settings(max_examples=500)
+@settings(max_examples=300)
 @given(
     st.dictionaries(
         st.sampled_from(("com_y", "com_x_rate", "com_y_rate", "fore_pitch", "hind_pitch_rate")),
