@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from flexspine import Robot
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
-from flexspine.hybrid.trajectory import HybridState, Trajectory
+from flexspine.hybrid.trajectory import Trajectory
 from flexspine.mechanics.linkage_motion import LinkageMotion
 from flexspine.models.bound_robot import BoundRobot
-from flexspine.models.drive import Drive, Turning
+from flexspine.models.drive import Drive, Moment, Turning
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Steady(Drive):
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         return Turning(self._symbols())
 
-    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+    def torques_at(self, bound: BoundRobot, moment: Moment, states: Array) -> Array:
         return np.array(list(self.values().values()))
 
 

@@ -60,9 +60,8 @@ class Clocked(Drive):
         sample = Guard("sample", NEXT_SAMPLE - CLOCK, decide=_sampled, timed=True)
         return (*super().guards(), sample)
 
-    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+    def torques_at(self, bound: BoundRobot, moment: Moment, states: Array) -> Array:
         """The torques that are held."""
-        moment = bound.moment(point)
         return np.array([moment.held[symbol] for symbol in self.held_torques.values()])
 
     def ready(self, start: Moment) -> Moment:

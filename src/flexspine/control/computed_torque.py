@@ -19,7 +19,6 @@ from flexspine.control.walking import Walker
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Guard
-from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion, Standing
 from flexspine.mechanics.linkage_tracking import follow
 from flexspine.models.articulated import BY, anchor, stands_in
@@ -75,9 +74,10 @@ class ComputedTorque(Walker):
             forces=found.forces if known else {},
         )
 
-    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+    def torques_at(self, bound: BoundRobot, moment: Moment, states: Array) -> Array:
         """The torques, from where the law knows them."""
-        counted = Footing.sticking_on(self.to_stand(bound.moment(point).held)).name
+        point = bound.point(moment, states)
+        counted = Footing.sticking_on(self.to_stand(moment.held)).name
         found = bound.observe(counted, point.states[None], point.held)
         return np.array([found[f"torque_{joint}"][0] for joint in self.robot.motors])
 

@@ -9,10 +9,9 @@ import sympy as sp
 from flexspine.control.laws import JointSprings
 from flexspine.control.walking import Walker
 from flexspine.hybrid.compile import Array
-from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage_motion import LinkageMotion
 from flexspine.models.bound_robot import BoundRobot
-from flexspine.models.drive import Turning
+from flexspine.models.drive import Moment, Turning
 
 STIFFNESS, DAMPING = sp.symbols("joint_stiffness joint_damping", real=True)
 
@@ -37,6 +36,6 @@ class SpringDriven(Walker):
         }
         return Turning(torques, self.references.definitions, self.observed_references)
 
-    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
+    def torques_at(self, bound: BoundRobot, moment: Moment, states: Array) -> Array:
         """The same in numbers."""
-        return self.springs.torques(self.situation(bound.moment(point)))
+        return self.springs.torques(self.situation(moment))

@@ -156,6 +156,11 @@ class Linkage:
         """Where a foot is, shape (..., 2)."""
         return self._point(q, self._foot_arms[name])
 
+    def feet_at(self, q: Array) -> Array:
+        """Where all feet are, shape (feet, 2); ``q`` has shape (N,)."""
+        angles, arms = self.angles(q), self._feet_arms(self._foot_arms)
+        return np.stack([arms @ np.cos(angles), arms @ np.sin(angles)], axis=1) + q[-2:]
+
     def com(self, q: Array) -> Array:
         """Where the centre of mass of all is, shape (..., 2)."""
         return self._point(q, self.moments / self.mass)

@@ -53,16 +53,19 @@ CREEP = 1e-12
 CHATTER_WINDOW = 1e-5
 
 
+@lru_cache(maxsize=256)
 def anchor(foot: str) -> tuple[sp.Symbol, sp.Expr]:
     """Where a foot came to rest on the ground."""
     return sp.Symbol(f"anchor_{foot}", real=True), sp.S.Zero
 
 
+@lru_cache(maxsize=256)
 def floor(foot: str) -> sp.Symbol:
     """The height at which a foot in the air lands: just below the ground, and below the foot."""
     return sp.Symbol(f"floor_{foot}", real=True)
 
 
+@lru_cache(maxsize=256)
 def impulse(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
     """The impulse on a foot at the latest impact, in N s."""
     return sp.Symbol(f"impulse_x_{foot}", real=True), sp.Symbol(f"impulse_y_{foot}", real=True)

@@ -105,9 +105,9 @@ class BoundRobot(BoundSystem):
         """The point of a moment; what else flows is that of ``states``."""
         n, to = self.linkage.size, self.linkage.to_absolute
         numbers = {**moment.held, **moment.footing.flags(self.robot.feet)}
-        for foot in self.robot.feet:
+        heights = self.linkage.feet_at(moment.q)[:, 1].tolist()
+        for foot, height in zip(self.robot.feet, heights, strict=True):
             # A foot that stood may have been in the ground by an error of integration.
-            height = float(self.linkage.foot(moment.q, foot)[1])
             numbers[floor(foot)] = min(height, 0.0) - DEPTH
         held = np.array([numbers[symbol] for symbol in self.system.held])
         new = np.concatenate([states[:n], to @ moment.rates, states[2 * n :]])
@@ -129,7 +129,7 @@ class BoundRobot(BoundSystem):
 
     def _stand(self, q: Array, rates: Array, held: Mapping[sp.Symbol, float]) -> Moment:
         linkage = self.linkage
-        places = {foot: linkage.foot(q, foot) for foot in self.robot.feet}
+        places = dict(zip(self.robot.feet, linkage.feet_at(q), strict=True))
         low = [foot for foot, (_, y) in places.items() if abs(y) <= GROUND]
         values = dict.fromkeys(self.system.held, 0.0)
         for foot, place in places.items():
@@ -144,7 +144,7 @@ class BoundRobot(BoundSystem):
         while moment.footing.feet:
             now = self._by_speed(moment)
             feet = now.footing.feet
-            torques = self.drive.torques_at(self, self.point(now, states))
+            torques = self.drive.torques_at(self, now, states)
             moving = [None if does is Contact.STICK else does for _, does in now.footing.contacts]
             found, accelerations = supported(
                 self.linkage, now.q, now.rates, feet, torques, self.robot.friction, moving
@@ -180,14 +180,13 @@ class BoundRobot(BoundSystem):
     def _lingering(self, moment: Moment, accelerations: Array) -> list[str]:
         """Feet in the air that would come back without having left."""
         linkage, found = self.linkage, []
-        for foot in self.robot.feet:
-            if moment.footing.does(foot) is Contact.OPEN:
-                height = linkage.foot(moment.q, foot)[1]
+        heights = linkage.feet_at(moment.q)[:, 1].tolist()
+        for foot, height in zip(self.robot.feet, heights, strict=True):
+            if height <= LEAST_BOUNCE and moment.footing.does(foot) is Contact.OPEN:
                 rise = self.rise(moment, foot)
                 bias = linkage.foot_bias(moment.q, moment.rates, [foot])[1]
                 gain = linkage.foot_jacobian(moment.q, [foot])[1] @ accelerations + bias
-                low = height <= LEAST_BOUNCE and rise >= 0
-                if low and gain < 0 and rise**2 <= 2 * -gain * LEAST_BOUNCE:
+                if rise >= 0 and gain < 0 and rise**2 <= 2 * -gain * LEAST_BOUNCE:
                     found.append(foot)
         return found
 

@@ -10,7 +10,6 @@ import numpy as np
 import sympy as sp
 
 from flexspine.hybrid.system import Guard
-from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.linkage import Array
 from flexspine.mechanics.linkage_motion import LinkageMotion, Point
 from flexspine.models.footing import Footing
@@ -80,8 +79,11 @@ class Drive:
         """The torques in a mode."""
         return Turning()
 
-    def torques_at(self, bound: BoundRobot, point: HybridState) -> Array:
-        """The torques at a point, in the order of the motors, shape (m,)."""
+    def torques_at(self, bound: BoundRobot, moment: Moment, states: Array) -> Array:
+        """The torques at a moment, in the order of the motors, shape (m,).
+
+        ``states`` are those that the moment itself does not tell.
+        """
         return np.zeros(bound.linkage.actuation.shape[1])
 
     def guards(self) -> tuple[Guard, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy as sp
 
@@ -23,6 +24,7 @@ _FLAGS = {
 _CONTACTS = {flags: contact for contact, flags in _FLAGS.items()}
 
 
+@lru_cache(maxsize=256)
 def flags_of(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
     """The symbols of a foot's flags."""
     return sp.Symbol(f"stands_{foot}", real=True), sp.Symbol(f"slides_{foot}", real=True)
