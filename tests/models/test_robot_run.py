@@ -65,7 +65,8 @@ def test_times_are_those_asked_for(run: RobotRun, data: xr.Dataset) -> None:
     chosen = robot_dataset(run, times=np.array([0.2, 0.05, 0.1]))
     assert chosen.time.values.tolist() == [0.05, 0.1, 0.2]
     for name in ("com", "link_angle", "grf", "kinetic_energy"):
-        np.testing.assert_array_equal(chosen[name][-1], coarse[name][2])
+        # NumPy rounds differently in tables of different lengths.
+        np.testing.assert_allclose(chosen[name][-1], coarse[name][2], rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.parametrize("interval", [0.0, -1.0, np.nan, np.inf, 1e-12])

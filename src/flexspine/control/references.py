@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import heyoka as hy
@@ -92,14 +93,26 @@ class FootPath:
 
     def motion(self) -> Course:
         """Place, velocity and acceleration."""
-        since = CLOCK - self.start
-        share, turn = since / self.span, 2 * sp.pi / self.span
-        x = self.x + self.stride * (share - sp.sin(turn * since) / (2 * sp.pi))
-        y = self.lift * (1 - sp.cos(turn * since)) / 2 * (1 - share**2) / HIGHEST
-        y -= self.sink * since
-        y += self.landing * self.span * share**2 * (1 - share)
-        place = sp.Matrix([x, y])
-        return place, place.diff(CLOCK), place.diff(CLOCK, 2)
+        own = {getattr(ANY_PATH, each.name): getattr(self, each.name) for each in fields(self)}
+        place, velocity, acceleration = (part.xreplace(own) for part in _course())
+        return place, velocity, acceleration
+
+
+ANY_PATH = FootPath.of("any leg")
+
+
+@lru_cache
+def _course() -> Course:
+    """Place, velocity and acceleration along `ANY_PATH`; to derive them takes a while."""
+    path = ANY_PATH
+    since = CLOCK - path.start
+    share, turn = since / path.span, 2 * sp.pi / path.span
+    x = path.x + path.stride * (share - sp.sin(turn * since) / (2 * sp.pi))
+    y = path.lift * (1 - sp.cos(turn * since)) / 2 * (1 - share**2) / HIGHEST
+    y -= path.sink * since
+    y += path.landing * path.span * share**2 * (1 - share)
+    place = sp.Matrix([x, y])
+    return place, place.diff(CLOCK), place.diff(CLOCK, 2)
 
 
 BODY = BodyCourse(*(_symbol(f"body_{each.name}") for each in fields(BodyCourse)))

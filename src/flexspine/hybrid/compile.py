@@ -61,8 +61,8 @@ class CompiledMode:
     """The machine code of one mode.
 
     ``state`` and ``numbers`` are the integrator's own memory: its state and its parameters, which
-    are the held variables and then the folded coefficients. ``owner`` is the `BoundMode` whose
-    coefficients stand there now.
+    are the held variables and then the coefficients: parameters, or what was folded of them.
+    ``owner`` is the `BoundMode` whose coefficients stand there now.
     """
 
     def __init__(
@@ -101,6 +101,7 @@ class CompiledSystem:
         self.tolerance = tolerance
         self._modes: dict[str, CompiledMode] = {}
         self._observables: dict[str, Any] = {}
+        self._lowerings: dict[str, Lowering] = {}
         self._states = {symbol: hy.make_vars(f"s{i}") for i, symbol in enumerate(system.states)}
         self._variables = list(self._states.values())
         self._held = {symbol: hy.par[i] for i, symbol in enumerate(system.held)}
@@ -119,7 +120,7 @@ class CompiledSystem:
         """Return the names of a mode's observables and the compiled function of them."""
         if name not in self._observables:
             mode = self.system.mode(name)
-            lower = self._plain(mode.definitions)
+            lower = self._plain(mode)
             function = compile_expressions(
                 [lower(expr) for expr in mode.observables.values()],
                 self._variables,
@@ -131,9 +132,7 @@ class CompiledSystem:
 
     def _compile(self, mode: Mode) -> CompiledMode:
         system = self.system
-        lower = Lowering(
-            {**self._states, **self._held}, system.parameters, mode.definitions, len(system.held)
-        )
+        lower = self._plain(mode) if system.large else self._folding(mode)
         field = [(self._states[s], lower(mode.field[s])) for s in system.states]
         events = [
             hy.t_event(lower(guard.expression), direction=hy.event_direction.negative)
@@ -144,7 +143,8 @@ class CompiledSystem:
             field, start, tol=self.tolerance, t_events=events, compact_mode=system.large
         )
         kernel, jumps = self._event_kernel(mode)
-        coefficients = self.coefficients(lower.coefficients)
+        # Of a large system nothing is folded, which takes longer than it saves.
+        coefficients = _as_they_are if system.large else self.coefficients(lower.coefficients)
         return CompiledMode(mode, integrator, coefficients, kernel, jumps)
 
     def coefficients(self, expressions: list[sp.Expr]) -> Any:
@@ -197,7 +197,7 @@ class CompiledSystem:
 
     def _landed(self, mode: Mode, guard: Guard) -> tuple[dict[sp.Symbol, Any], Mode]:
         """Where a jump leads: states and held variables there, and the mode."""
-        lower = self._plain(mode.definitions)
+        lower = self._plain(mode)
         resets = {symbol: lower(value) for symbol, value in guard.resets.items()}
         target = self.system.mode(guard.target or mode.name)
         return {**self._states, **self._held, **resets}, target
@@ -214,7 +214,7 @@ class CompiledSystem:
         self, mode: Mode, expressions: list[sp.Expr], at: Mapping[sp.Symbol, Any]
     ) -> list[Any]:
         """Each expression's value and rate along the field, at these values of the variables."""
-        lower = self._plain(mode.definitions)
+        lower = self._plain(mode)
         field = [lower(mode.field[symbol]) for symbol in self._states]
         pairs: list[Any] = []
         for expression in expressions:
@@ -226,9 +226,17 @@ class CompiledSystem:
         moved = {v: at[s] for s, v in (self._states | self._held).items() if at[s] != v}
         return list(hy.subs(pairs, moved)) if moved else pairs
 
-    def _plain(self, definitions: Mapping[sp.Symbol, sp.Expr]) -> Lowering:
-        """A lowering that folds nothing; kernels are called too seldom to gain from it."""
-        return Lowering({**self._states, **self._held, **self._raw}, (), definitions, 0)
+    def _folding(self, mode: Mode) -> Lowering:
+        """A mode's lowering in which what depends on parameters only becomes one number each."""
+        variables, first = {**self._states, **self._held}, len(self.system.held)
+        return Lowering(variables, self.system.parameters, mode.definitions, first)
+
+    def _plain(self, mode: Mode) -> Lowering:
+        """A mode's lowering that folds nothing; kernels are called too seldom to gain from it."""
+        if mode.name not in self._lowerings:
+            variables = {**self._states, **self._held, **self._raw}
+            self._lowerings[mode.name] = Lowering(variables, (), mode.definitions, 0)
+        return self._lowerings[mode.name]
 
 
 def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool = False) -> Any:
@@ -238,6 +246,10 @@ def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool
         vars=variables or [hy.expression("unused")],
         compact_mode=large,
     )
+
+
+def _as_they_are(parameters: Array) -> Array:
+    return parameters
 
 
 def _in_kernel(mode: Mode) -> list[Guard]:

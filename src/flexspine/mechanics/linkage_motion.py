@@ -18,7 +18,6 @@ from flexspine.mechanics.elimination import solve
 from flexspine.mechanics.linkage import Linkage
 
 Point = tuple[sp.Expr, sp.Expr]
-Row = list[sp.Expr]
 
 # 1/s; how fast rounding errors of a foot's place die away. Where there are none it does nothing.
 SETTLING = 30
@@ -151,13 +150,12 @@ class LinkageMotion:
 
     def damper_power(self) -> sp.Expr:
         """What the dampers of all joints take up."""
-        return sum(
-            (
+        return sp.Add(
+            *(
                 self.parameter(f"{joint.name}_damping", joint.damping)
                 * self.bend_rate(joint.name) ** 2
                 for joint in self.linkage.joints
-            ),
-            sp.S.Zero,
+            )
         )
 
     def foot(self, name: str) -> Point:
@@ -174,8 +172,8 @@ class LinkageMotion:
     def _place(self, arms: Mapping[int, sp.Expr]) -> Point:
         x, y = self.coordinates[-2:]
         return (
-            x + sum((arm * self._of(j)[1] for j, arm in arms.items()), sp.S.Zero),
-            y + sum((arm * self._of(j)[0] for j, arm in arms.items()), sp.S.Zero),
+            sp.Add(x, *(arm * self._of(j)[1] for j, arm in arms.items())),
+            sp.Add(y, *(arm * self._of(j)[0] for j, arm in arms.items())),
         )
 
     def foot_rows(self, feet: Sequence[str]) -> tuple[sp.Matrix, list[sp.Expr]]:
@@ -218,15 +216,15 @@ class LinkageMotion:
         alone, *spread = ([column[i] for i in back] for column in solved)
         if not feet:
             return {**self.definitions, **definitions}, alone, {}
-        response = sp.Matrix(count, count, lambda i, j: _dot(rows.row(i), spread[j]))
+        response = sp.Matrix(count, count, lambda i, j: dot(rows.row(i), spread[j]))
         settling = [part for foot in feet for part in self.settling(foot)]
-        missing = [settling[i] - bias[i] - _dot(rows.row(i), alone) for i in range(count)]
+        missing = [settling[i] - bias[i] - dot(rows.row(i), alone) for i in range(count)]
         flagged = any(isinstance(foot, MaybeStanding) for foot in feet)
         if flagged:
             response, missing = self._flagged(feet, response, missing)
         more, (forces,) = solve(response, [missing], "feet_", symmetric=not flagged)
         accelerations = [
-            alone[c] + sum(spread[r][c] * forces[r] for r in range(count))
+            sp.Add(alone[c], *(spread[r][c] * forces[r] for r in range(count)))
             for c in range(len(order))
         ]
         by_foot = {foot.name: (forces[2 * i], forces[2 * i + 1]) for i, foot in enumerate(feet)}
@@ -299,5 +297,6 @@ class LinkageMotion:
         return number, self.linkage.place[parent]
 
 
-def _dot(row: Row, column: Sequence[sp.Expr]) -> sp.Expr:
-    return sum((a * b for a, b in zip(row, column, strict=True)), sp.S.Zero)
+def dot(row: Sequence[sp.Expr], column: Sequence[sp.Expr]) -> sp.Expr:
+    """The sum of products."""
+    return sp.Add(*(a * b for a, b in zip(row, column, strict=True)))

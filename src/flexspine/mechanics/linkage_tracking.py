@@ -15,7 +15,7 @@ import sympy as sp
 
 from flexspine.mechanics.elimination import solve
 from flexspine.mechanics.linkage import Linkage
-from flexspine.mechanics.linkage_motion import LinkageMotion, Point, Standing
+from flexspine.mechanics.linkage_motion import LinkageMotion, Point, Standing, dot
 
 
 @dataclass(frozen=True)
@@ -52,25 +52,25 @@ def follow(
     for number, link in enumerate(linkage.links):
         driven = [wanted[name] for name in _on_the_way(linkage, number) if name in wanted]
         symbol = sp.Symbol(f"law_given_{link.name}", real=True)
-        definitions[symbol] = sum(driven, sp.S.Zero)
+        definitions[symbol] = sp.Add(*driven)
         given.append(symbol if driven else sp.S.Zero)
     given += [sp.S.Zero, sp.S.Zero]
     matrix, applied = motion.mass_matrix(), motion.forces({})
     size = len(given)
-    left = [applied[i] - sum(matrix[i, j] * given[j] for j in range(size)) for i in range(size)]
+    left = [applied[i] - dot(matrix.row(i), given) for i in range(size)]
     order = list(range(count))[::-1]  # the base first, which couples to all the same way
     shares = [free[p] for p in order]
     small = sp.Matrix(
         count,
         count,
-        lambda i, j: sum(matrix[a, b] for a in shares[i] for b in shares[j]),
+        lambda i, j: sp.Add(*(matrix[a, b] for a in shares[i] for b in shares[j])),
     )
     rows, bias = motion.foot_rows([foot.name for foot in feet])
-    held = [[sum(rows[r, a] for a in share) for share in shares] for r in range(rows.rows)]
+    held = [[sp.Add(*(rows[r, a] for a in share)) for share in shares] for r in range(rows.rows)]
     closeness = _closeness(held, order)
     if closeness == 0:
         raise ValueError("2 feet at one hip hold what the motors are to move")
-    columns = [[sum(left[a] for a in share) for share in shares], *held]
+    columns = [[sp.Add(*(left[a] for a in share)) for share in shares], *held]
     more, (alone, *spread) = solve(small, columns, "law_")
     definitions |= more
     needed = []
@@ -78,37 +78,36 @@ def follow(
         settling = motion.settling(foot)
         for axis in range(2):
             r = 2 * number + axis
-            course = sum(rows[r, j] * given[j] for j in range(size))
-            needed.append(settling[axis] - bias[r] - course - _dot(held[r], alone))
+            course = dot(rows.row(r), given)
+            needed.append(settling[axis] - bias[r] - course - dot(held[r], alone))
     sizes: Sequence[sp.Expr] = ()
     if feet:
-        response = sp.Matrix(len(held), len(held), lambda i, j: _dot(held[i], spread[j]))
+        response = sp.Matrix(len(held), len(held), lambda i, j: dot(held[i], spread[j]))
         more, (sizes,) = solve(response, [needed], "law_feet_")
         definitions |= more
     moves = [
-        alone[i] + sum(spread[r][i] * sizes[r] for r in range(len(held))) for i in range(count)
+        sp.Add(alone[i], *(spread[r][i] * sizes[r] for r in range(len(held)))) for i in range(count)
     ]
     accelerations: list[sp.Expr] = []
     for number, coordinate in enumerate(motion.coordinates):
         symbol = sp.Symbol(f"{coordinate.name}_wanted", real=True)
-        definitions[symbol] = given[number] + sum(
-            move for move, share in zip(moves, shares, strict=True) if number in share
+        definitions[symbol] = sp.Add(
+            given[number],
+            *(move for move, share in zip(moves, shares, strict=True) if number in share),
         )
         accelerations.append(symbol)
     missing: list[sp.Expr] = []
     for i in range(len(linkage.links)):
         symbol = sp.Symbol(f"law_missing_{linkage.links[i].name}", real=True)
         definitions[symbol] = (
-            sum(matrix[i, j] * accelerations[j] for j in range(size))
-            - applied[i]
-            - sum(rows[r, i] * sizes[r] for r in range(len(held)))
+            dot(matrix.row(i), accelerations) - applied[i] - dot(rows.col(i), sizes)
         )
         missing.append(symbol)
     torques = {}
     for name in wanted:
         symbol = sp.Symbol(f"torque_{name}", real=True)
-        definitions[symbol] = sum(
-            missing[i] for i in range(len(linkage.links)) if name in _on_the_way(linkage, i)
+        definitions[symbol] = sp.Add(
+            *(missing[i] for i in range(len(linkage.links)) if name in _on_the_way(linkage, i))
         )
         torques[name] = symbol
     forces = {foot.name: (sizes[2 * i], sizes[2 * i + 1]) for i, foot in enumerate(feet)}
@@ -143,7 +142,3 @@ def _closeness(held: list[list[sp.Expr]], order: list[int]) -> sp.Expr | None:
     angles = [i for i, p in enumerate(order) if p < len(order) - 2]
     apart = sp.Matrix(2, 2, lambda i, j: held[2 + i][angles[j]] - held[i][angles[j]])
     return apart.det()
-
-
-def _dot(row: Sequence[sp.Expr], column: Sequence[sp.Expr]) -> sp.Expr:
-    return sum((a * b for a, b in zip(row, column, strict=True)), sp.S.Zero)

@@ -75,21 +75,22 @@ def impulse(foot: str) -> tuple[sp.Symbol, sp.Symbol]:
 class Build:
     """What driven robots have in common that share their compiled equations, and one of them.
 
-    ``values`` are that one's numbers, by symbol.
+    ``motion`` are its mechanics and ``values`` its numbers, by symbol.
     """
 
     key: tuple[object, ...]
     drive: Drive = field(compare=False)
+    motion: LinkageMotion = field(compare=False)
     values: Mapping[sp.Symbol, float] = field(compare=False)
 
     @classmethod
     def like(cls, drive: Drive) -> Build:
         """The build of a driven robot: its parts, and which of its numbers vanish."""
         robot = drive.robot
-        values = complete_motion(robot).values
+        motion = complete_motion(robot)
         parts = (robot.parents, robot.joints, robot.feet)
-        key = (*(tuple(part.items()) for part in parts), tuple(values), drive.key)
-        return cls(key, drive, values | drive.values())
+        key = (*(tuple(part.items()) for part in parts), tuple(motion.values), drive.key)
+        return cls(key, drive, motion, motion.values | drive.values())
 
 
 def complete_motion(robot: Robot) -> LinkageMotion:
@@ -141,8 +142,7 @@ class Happenings:
 @lru_cache(maxsize=32)
 def articulated_system(build: Build, happenings: Happenings) -> HybridSystem:
     """Assemble the hybrid system of all driven robots of one build."""
-    drive, robot = build.drive, build.drive.robot
-    motion = complete_motion(robot)
+    drive, motion, robot = build.drive, build.motion, build.drive.robot
     held = [
         symbol
         for foot in robot.feet
