@@ -226,7 +226,7 @@ def test_an_interrupt_while_starting_is_no_traceback(tmp_path: Path, delay: floa
 
 
 def test_pictures_of_an_earlier_run_do_not_stay(cli: Cli, tmp_path: Path) -> None:
-    assert cli("bound", "--out", "results").returncode == 0
+    assert cli("bound", "--duration", "0.05", "--out", "results").returncode == 0
     assert (tmp_path / "results" / "animation.gif").exists()
     assert cli("bound", "--out", "results", "--no-animation").returncode == 0
     assert not (tmp_path / "results" / "animation.gif").exists()
