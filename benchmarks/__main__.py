@@ -23,6 +23,7 @@ from rich.table import Table
 from benchmarks import hand_field, scipy_peer
 from benchmarks.ensemble_benchmark import ensemble_benchmark, print_ensemble
 from benchmarks.gait_benchmark import gait_benchmark
+from benchmarks.robot_benchmark import print_robot, robot_benchmark
 from benchmarks.timing import TOLERANCES, in_turn, median, ratio, seconds
 from flexspine import load_model
 from flexspine.hybrid.integrate import integrate
@@ -202,6 +203,7 @@ def main() -> None:
         "field": (field_benchmark, print_field),
         "gaits": (gait_benchmark, print_gaits),
         "ensemble": (lambda: ensemble_benchmark(console), print_ensemble),
+        "robot": (robot_benchmark, print_robot),
         "start": (start_benchmark, print_starts),
     }
     wanted = sys.argv[1:] or list(sections)

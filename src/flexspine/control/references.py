@@ -87,6 +87,7 @@ class FootPath:
     span: sp.Symbol
 
     @classmethod
+    @lru_cache(maxsize=256)
     def of(cls, leg: str) -> FootPath:
         """The path of a leg's foot."""
         return cls(*(_symbol(f"path_{each.name}_{leg}") for each in fields(cls)))
