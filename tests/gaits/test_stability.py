@@ -23,6 +23,7 @@ from flexspine.errors import ParameterError
 from flexspine.gaits.return_map import linearize
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.integrate import integrate
+from flexspine.models.actuation import STRIDE_PHASES
 from flexspine.models.simulation import DEFAULT_TOLERANCE
 from flexspine.parameters import values
 from tests import second_implementation as reference
@@ -285,6 +286,11 @@ DIMENSIONS = {
     "spine.stiffness": (1, 2, -2),
     "spine.damping": (1, 2, -1),
     "rest_angle": (0, 0, 0),
+    "stiffening": (0, 0, 0),
+    "extension": (0, 1, 0),
+    "hip_lever": (0, 1, 0),
+    **{f"stiffness_shift.{phase}": (0, 0, 0) for phase in STRIDE_PHASES},
+    **{f"rest_shift.{phase}": (0, 0, 0) for phase in STRIDE_PHASES},
     "gravity": (0, 1, -2),
     "height": (0, 1, 0),
     "speed": (0, 1, -1),

@@ -16,9 +16,13 @@ from flexspine.parameters import values
 
 
 def test_a_dataset_has_every_quantity_with_a_unit(flexible: Model) -> None:
-    data = to_dataset(simulate(flexible))
+    moved = {"legs.extension": 0.01, "legs.hip_lever": 0.01, "spine.rest_shift.fore": 0.1}
+    actuated = to_dataset(simulate(flexible.with_values(moved)))
     expected = set(VARIABLES) - {"pitch", "pitch_rate"} | {"phase", "event_time", "event_kind"}
-    assert set(data.data_vars) == expected
+    assert set(actuated.data_vars) == expected
+    data = to_dataset(simulate(flexible))
+    passive = {name for name in expected if not name.endswith(("_work", "_torque"))}
+    assert set(data.data_vars) == passive | {"spine_torque"}
     for name, (unit, _) in VARIABLES.items():
         if name in data:
             assert data[name].attrs["units"] == unit

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from flexspine._version import SCHEMA_VERSION
 from flexspine.cli.options import Json
 from flexspine.cli.output import print_json
+
+if TYPE_CHECKING:
+    from flexspine.models.bounder import Body
+    from flexspine.parameters import Quantity
 
 
 class Format(StrEnum):
@@ -45,17 +50,20 @@ def equations(
     """
     from flexspine.errors import UnknownNameError
     from flexspine.mechanics.equations import as_latex, as_text, written_out
+    from flexspine.models.actuation import DAMPED
     from flexspine.models.bounder import lagrangian, stance_legs
     from flexspine.models.presets import load_model, preset_names
     from flexspine.models.registry import KINDS
+    from flexspine.parameters import quantities
 
     try:
         kind = KINDS[model] if model in KINDS else load_model(model).kind
     except UnknownNameError:
         raise UnknownNameError("model or preset", model, [*KINDS, *preset_names()]) from None
-    body = kind.body(True)
-    lines = written_out(lagrangian(body, stance_legs(body, phase.value, damped=True)))
-    letters = _letters(kind)
+    body = kind.body(DAMPED)
+    stance = stance_legs(body, phase.value, DAMPED)
+    lines = written_out(lagrangian(body, phase.value, stance))
+    letters = _letters(body, quantities(kind.parameters))
     if json:
         print_json(
             {
@@ -80,18 +88,18 @@ def equations(
         print(f"% {title}", as_latex(lines), sep="\n")
 
 
-def _letters(kind: Any) -> dict[str, str]:
-    """What the letters of a model stand for."""
+def _letters(body: Body, about: Iterator[Quantity]) -> dict[str, str]:
+    """What the letters of a model without actuators stand for."""
+    from flexspine.models.actuation import ACTUATORS
     from flexspine.models.bounder import FORE, HIND, HIP
-    from flexspine.parameters import quantities
 
-    about = {item.name: item for item in quantities(kind.parameters)}
     letters = {
-        str(letter): f"{about[name].meaning} ({name}, {about[name].unit})"
-        for name, letter in kind.body(True).parameters.items()
+        str(body.parameters[item.name]): f"{item.meaning} ({item.name}, {item.unit})"
+        for item in about
+        if item.name not in ACTUATORS
     }
     letters |= {"x, y": "position of the CoM (m)"}
-    for angle, _ in kind.body(True).coordinates.values():
+    for angle, _ in body.coordinates.values():
         letters[str(angle)] = "pitch, nose up positive (rad)"
     for leg in (FORE, HIND):
         x, y = HIP[leg.side]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,7 @@ def trace_branch(
     *,
     bounds: tuple[float, float],
     fixed: Mapping[str, float] | None = None,
+    free: Collection[str] = (),
     symmetric: bool | None = None,
     longest_step: float = LONGEST_STEP,
     most_points: int = MOST_POINTS,
@@ -77,12 +78,13 @@ def trace_branch(
     ``over`` is ``mean_speed``, ``energy``, an apex coordinate, ``touchdown.fore`` or ``.hind``, or
     a parameter by its dotted name. ``fixed`` are the quantities kept, by default the gait's
     energy, apex height and mean speed without ``over``, or, for another apex coordinate or a
-    touchdown angle, energy and height. ``symmetric`` follows symmetric gaits only
+    touchdown angle, energy and height. ``free`` are further parameters that may change, such as an
+    actuator that makes good what dampers take. ``symmetric`` follows symmetric gaits only
     (by default if the gait is one). ``store`` is a file that keeps every step; traced again with
     the same arguments, the branch goes on from there. SI and radians. Raises `UnknownNameError`,
     `ParameterError`, `OutputError`.
     """
-    family = family_of(gait, over, fixed, symmetric)
+    family = family_of(gait, over, fixed, symmetric, free)
     tracer = Tracer(family, bounds, longest_step, most_points)
     start = tracer.start(gait)
     checkpoint = None
@@ -113,6 +115,7 @@ def _description(family: Family, gait: Gait) -> dict[str, Any]:
         "flexspine": __version__,
         "over": family.over,
         "fixed": problem.fixed,
+        "free": problem.free,
         "symmetric": problem.symmetric,
         "strides": problem.strides,
         "tolerance": problem.tolerance,
@@ -124,7 +127,11 @@ def _description(family: Family, gait: Gait) -> dict[str, Any]:
 
 
 def family_of(
-    gait: Gait, over: str, fixed: Mapping[str, float] | None, symmetric: bool | None
+    gait: Gait,
+    over: str,
+    fixed: Mapping[str, float] | None,
+    symmetric: bool | None,
+    free: Collection[str] = (),
 ) -> Family:
     """The family that a gait belongs to. Raises `UnknownNameError` and `ParameterError`."""
     known = {*gait.model.apex, *ANGLES, "mean_speed", "energy"}
@@ -137,12 +144,14 @@ def family_of(
     kept = {
         name: value for name, value in (own if fixed is None else fixed).items() if name != over
     }
-    free = () if over in known else (over,)
+    unknown = (*(() if over in known else (over,)), *free)
     mirrored = gait.symmetric if symmetric is None else symmetric
+    if symmetric is None and not gait.model.keeping(unknown).features.reversible:
+        mirrored = False
     problem = Problem(
         gait.model,
         kept,
-        free=free,
+        free=unknown,
         symmetric=mirrored,
         strides=gait.strides,
         tolerance=gait.tolerance,

@@ -12,6 +12,7 @@ from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.trajectory import Trajectory
+from flexspine.models.bounder import FORE, HIND
 from flexspine.models.legs import SIDES, STANCE_PHASES
 from flexspine.models.model import Model
 from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count, simulate
@@ -114,8 +115,8 @@ class Gait:
     @cached_property
     def liftoff_angles(self) -> dict[str, float]:
         """Of each leg at its latest lift-off, in rad from the vertical."""
-        held = self.trajectory.end.held[-len(SIDES) :]
-        return dict(zip(SIDES, held.tolist(), strict=True))
+        held, places = self.trajectory.end.held, self.model.system.places
+        return {leg.side: float(held[places[leg.left]]) for leg in (FORE, HIND)}
 
     @cached_property
     def summary(self) -> Summary:

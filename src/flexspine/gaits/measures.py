@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.trajectory import Arc, HybridState
+from flexspine.models.bounder import works
 from flexspine.models.dataset import sample, sample_times
 from flexspine.models.legs import SIDES, STANCE_PHASES
 from flexspine.models.simulation import Run
@@ -36,12 +38,20 @@ _REAL = 1e-9
 _SHORTEST_INTERVAL = 1e-9
 
 
+class Work(NamedTuple):
+    """What an actuator has done, in J: the sum of all it gave, and that less what it took back."""
+
+    positive: float
+    net: float
+
+
 @dataclass(frozen=True)
 class Summary:
     """The measures of a run. Lengths in m, times in s, forces in N per pair of legs, angles in rad.
 
-    Those of a stride (``period`` to ``froude``) are of the last completed one, or None. Peaks and
-    ``spine_range`` are over the whole run.
+    Those of a stride (``period`` to ``froude``) are of the last completed one, or None. Peaks,
+    ``spine_range``, ``work`` by actuator and ``cost_of_transport`` are over the whole run; the last
+    is all positive work by weight and distance, None without a distance.
     """
 
     period: float | None
@@ -55,13 +65,16 @@ class Summary:
     peak_grf_vertical: dict[str, float]
     spine_range: tuple[float, float] | None
     energy: dict[str, float | None]
+    work: dict[str, Work]
+    cost_of_transport: float | None
 
 
 def summarize(run: Run, profile: Profile | None = None) -> Summary:
     """Measure a run.
 
     ``froude`` is v^2 / (g l) with the mean speed of the stride and the mean rest length of the
-    legs; ``relative_drift`` the largest change of total plus dissipated energy over the initial.
+    legs; ``relative_drift`` the largest change, over the initial energy, of total and dissipated
+    energy less the work of actuators.
     ``profile`` spares making that of the run anew.
     """
     trajectory = run.trajectory
@@ -92,7 +105,22 @@ def summarize(run: Run, profile: Profile | None = None) -> Summary:
         peak_grf_vertical={side: profile.range(f"{side}_grf_y")[1] for side in SIDES},
         spine_range=spine,
         energy=_energy(run),
+        work=(work := _work(run, profile)),
+        cost_of_transport=sum(each.positive for each in work.values())
+        / (run.model.mass * given["gravity"] * abs(moved))
+        if moved
+        else None,
     )
+
+
+def _work(run: Run, profile: Profile) -> dict[str, Work]:
+    """What each actuator has done, by the name of its work."""
+    start, end = run.trajectory.start.states, run.trajectory.end.states
+    places = run.model.system.places
+    return {
+        name: Work(profile.rise(name), float(end[places[symbol]] - start[places[symbol]]))
+        for name, symbol in works(run.model.features).items()
+    }
 
 
 def _last_stride(run: Run) -> tuple[HybridState, HybridState] | None:
@@ -131,6 +159,18 @@ class Profile:
         parts = (steps @ table[name] @ _MEAN for steps, table in pairs if name in table)
         return float(sum(parts)) / duration
 
+    def rise(self, name: str) -> float:
+        """Return the sum of all by which a state grows, at events too."""
+        found, last = 0.0, None
+        for table in self._tables:
+            for row in table[name]:
+                values_ = _turning_values(row)
+                found += float(np.maximum(np.diff(values_), 0.0).sum())
+                if last is not None:
+                    found += max(float(values_[0]) - last, 0.0)
+                last = float(values_[-1])
+        return found
+
     def first(self, name: str) -> float:
         """Return the value at the start."""
         return float(self._tables[0][name][0, 0])
@@ -157,6 +197,18 @@ def _range(table: Array) -> tuple[float, float]:
     return low, high
 
 
+def _turning_values(samples: Array) -> Array:
+    """The values of the interpolant at its ends, and between them wherever it turns round."""
+    ends = samples[[0, -1]]
+    steps = np.diff(samples)
+    if not (steps.min() < 0 < steps.max()):
+        return ends
+    series = _INTERPOLATE @ samples
+    turns = chebyshev.chebroots(chebyshev.chebder(series))
+    inside = np.sort(turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)])
+    return np.concatenate([ends[:1], chebyshev.chebval(inside, series), ends[1:]])
+
+
 def _polished(samples: Array, sign: float) -> float:
     """The largest value of ``sign`` times the interpolant of the samples."""
     series = _INTERPOLATE @ (sign * samples)
@@ -178,6 +230,8 @@ def _energy(run: Run) -> dict[str, float | None]:
     interval = max(run.trajectory.duration / 1000, _SHORTEST_INTERVAL)
     table = sample(run, sample_times(run.trajectory, interval))
     balance = table["total_energy"] + table["dissipated_energy"]
+    for name in works(run.model.features):
+        balance = balance - table[name]
     initial = float(balance[0])
     drift = float(np.max(np.abs(balance - initial)))
     return {"initial": initial, "relative_drift": drift / abs(initial) if initial else None}

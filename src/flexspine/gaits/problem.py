@@ -81,9 +81,9 @@ class Problem:
         strides: int = 1,
         tolerance: float,
     ) -> None:
-        self.model, self.fixed, self.free = model, dict(fixed), free
+        self.model, self.fixed, self.free = model.keeping(free), dict(fixed), free
         self.symmetric, self.strides, self.tolerance = symmetric, strides, tolerance
-        self.system = model.system
+        self.system = self.model.system
         self.compiled = compile_system(self.system, tolerance)
         self._check()
         spanned = self._spanned()
@@ -121,10 +121,10 @@ class Problem:
     def _check_symmetry(self) -> None:
         model, reversal = self.model, self.system.reversal
         if not (reversal and model.alike):
-            reason = "its ends differ" if reversal else "it has dampers"
+            reason = "its ends differ" if reversal else "it has dampers or actuators"
             raise ParameterError(
                 f"'{model.name}' has no symmetric gaits, as {reason}",
-                "look for general ones, or make fore and hind ends alike and free of damping",
+                "look for general ones, or make both ends alike, without dampers and thrust",
             )
         for name in self.fixed:
             if name in self.system.section.coordinates and name not in reversal.coordinates:
@@ -132,7 +132,7 @@ class Problem:
                     f"symmetry decides '{name}' already", "leave it, or look for general gaits"
                 )
         for name in self.free:
-            if name.split(".")[0] in SIDES:
+            if set(name.split(".")) & {*SIDES}:
                 raise ParameterError(
                     f"'{name}' would make the ends differ", "look for general gaits"
                 )

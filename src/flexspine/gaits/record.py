@@ -40,6 +40,8 @@ def run_record(run: Run) -> dict[str, Any]:
         "froude": summary.froude,
         "spine_range": None if spine is None else {"min": spine[0], "max": spine[1]},
         "energy": summary.energy,
+        "work": {name: each._asdict() for name, each in summary.work.items()},
+        "cost_of_transport": summary.cost_of_transport,
         "apexes": run.apexes,
         "touchdown_angles": dict(run.model.touchdown),
         "tolerance": run.tolerance,

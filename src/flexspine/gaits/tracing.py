@@ -96,6 +96,9 @@ class Tracer:
 
     def _step(self, tracing: Tracing) -> Tracing:
         family, here, step = self.family, tracing.points[-1], tracing.step
+        ahead = self.low if here.tests[FOLD] < 0 else self.high
+        if here.value == ahead:
+            return replace(tracing, end=f"reached {family.over} = {ahead:g}")
         guess = here.point + step * here.tangent
         attempt = family.correct(guess, Slice(here.tangent, guess))
         if not attempt.solved:
@@ -125,13 +128,10 @@ class Tracer:
         """Land on the bound that was overstepped."""
         here = tracing.points[-1]
         bound = self.low if beyond.value < self.low else self.high
-        end = f"reached {self.family.over} = {bound:g}"
-        if here.value == bound:
-            return replace(tracing, end=end)
         edge = land(self.family, Segment(self.family, here, beyond), bound)
         if edge is None:
             return self._shorter(tracing, "the bound could not be reached")
-        return _extended(tracing, self.family, edge, end=end)
+        return _extended(tracing, self.family, edge)
 
     def _shorter(self, tracing: Tracing, reason: str) -> Tracing:
         """Try again with half the step, or give up and say why."""

@@ -24,10 +24,13 @@ Definitions = Mapping[sp.Symbol, sp.Expr]
 
 @dataclass(frozen=True)
 class AppliedForce:
-    """A force (components in the inertial frame, N) at a point of the system (m)."""
+    """A force (components in the inertial frame, N) at a point of the system (m).
 
-    components: tuple[sp.Expr, sp.Expr]
-    point: tuple[sp.Expr, sp.Expr]
+    A torque (N m) is a force of one component at an angle (rad).
+    """
+
+    components: tuple[sp.Expr, ...]
+    point: tuple[sp.Expr, ...]
 
 
 @dataclass(frozen=True)

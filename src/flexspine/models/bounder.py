@@ -8,7 +8,7 @@ had a stance.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,6 +17,7 @@ import sympy as sp
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Reversal, Section
 from flexspine.mechanics.lagrangian import Definitions, Lagrangian
+from flexspine.models.actuation import SPINE_WORK, Features, SwitchedSpine
 from flexspine.models.legs import (
     PHASES,
     SIDES,
@@ -27,7 +28,7 @@ from flexspine.models.legs import (
     hip_velocity,
     phase_of,
 )
-from flexspine.parameters import ParameterSet, quantity, values
+from flexspine.parameters import ParameterSet, quantity
 
 FELL = OutcomeKind(
     "fell",
@@ -41,6 +42,7 @@ NO_APEX = OutcomeKind(
 
 X, Y, X_RATE, Y_RATE, DISSIPATED, GRAVITY = sp.symbols("x y xdot ydot E_d g", real=True)
 FORE, HIND = LegSymbols.of("fore"), LegSymbols.of("hind")
+STOOD = FORE.stanced, HIND.stanced
 
 # The CoM passes the middle between the toes while both legs stand.
 MIDSTANCE = "mid-stance"
@@ -60,9 +62,10 @@ class Body:
 
     ``coordinates`` maps public names of the angles to (angle, rate), in rad and rad/s;
     ``parameters`` maps dotted names to letters; hips and ``low_points`` are in the inertial
-    frame, the latter being what must stay above the ground besides the hips. ``power_lost`` is
-    what the spine's damper takes, in W. Where fore and hind ends are alike, looking at the body
-    from its other side turns each angle into minus that in ``mirror``.
+    frame, the latter being what must stay above the ground besides the hips. ``pitches`` are angle
+    and rate of what carries each hip. ``power_lost`` is what the spine's damper takes, in W. Where
+    fore and hind ends are alike, looking at the body from its other side turns each angle into
+    minus that in ``mirror``.
     """
 
     coordinates: Mapping[str, tuple[sp.Symbol, sp.Symbol]]
@@ -72,7 +75,9 @@ class Body:
     kinetic: sp.Expr
     gravity: sp.Expr
     hips: Mapping[str, tuple[sp.Expr, sp.Expr]]
+    pitches: Mapping[str, tuple[sp.Symbol, sp.Symbol]]
     spine: sp.Expr = sp.S.Zero
+    switched: SwitchedSpine | None = None
     power_lost: sp.Expr = sp.S.Zero
     low_points: Mapping[str, sp.Expr] = field(default_factory=dict)
     observables: Mapping[str, sp.Expr] = field(default_factory=dict)
@@ -85,27 +90,25 @@ HIP = {side: sp.symbols(f"X_{side[0]} Y_{side[0]}", real=True) for side in SIDES
 class BounderKind:
     """A kind of bounder: its parameter class and how its body follows from the parameters.
 
-    ``body`` takes whether the spine has a damper, to leave out the terms of one that has not.
+    ``body`` takes which dampers and actuators there are, to leave out the terms of all others.
     """
 
     name: str
     title: str
     source: str
     parameters: type[ParameterSet]
-    body: Callable[[bool], Body]
+    body: Callable[[Features], Body]
 
-    def system(self, parameters: ParameterSet) -> HybridSystem:
-        """The hybrid system for these parameters; only what vanishes depends on their values."""
-        given = values(parameters)
-        damped_legs = any(given[f"{side}.leg.damping"] > 0 for side in HIP)
-        damped_spine = given.get("spine.damping", 0.0) > 0
-        return bounder_system(self.name, self.body(damped_spine), damped_legs)
+    def system(self, features: Features) -> HybridSystem:
+        """The hybrid system of all models with these features."""
+        return bounder_system(self.name, self.body(features), features)
 
 
-def lagrangian(body: Body, stance: tuple[StanceLeg, ...] = ()) -> Lagrangian:
+def lagrangian(body: Body, phase: str = "DF", stance: tuple[StanceLeg, ...] = ()) -> Lagrangian:
     """The body's mechanics with the given legs on the ground."""
     angles = body.coordinates.values()
-    definitions = dict(body.definitions)
+    definitions = body.switched.definitions(phase, STOOD) if body.switched else {}
+    definitions |= body.definitions
     for side, (x, y) in body.hips.items():
         definitions |= dict(zip(HIP[side], (x, y), strict=True))
     for leg in stance:
@@ -116,44 +119,52 @@ def lagrangian(body: Body, stance: tuple[StanceLeg, ...] = ()) -> Lagrangian:
         kinetic=body.kinetic,
         potential=body.gravity + body.spine,
         dissipation=body.power_lost / 2,
-        forces=tuple(leg.force for leg in stance),
+        forces=tuple(force for leg in stance for force in leg.applied),
         definitions=definitions,
     )
 
 
-def stance_legs(body: Body, phase: str, damped: bool) -> tuple[StanceLeg, ...]:
+def stance_legs(body: Body, phase: str, features: Features) -> tuple[StanceLeg, ...]:
     """The legs that stand in a phase."""
     bare = lagrangian(body)
     return tuple(
-        StanceLeg(leg, HIP[leg.side], hip_velocity(bare, HIP[leg.side]), damped)
+        StanceLeg(
+            leg,
+            HIP[leg.side],
+            hip_velocity(bare, HIP[leg.side]),
+            body.pitches[leg.side],
+            features,
+        )
         for leg in (FORE, HIND)
         if phase in STANCE_PHASES[leg.side]
     )
 
 
 @lru_cache(maxsize=32)
-def bounder_system(name: str, body: Body, damped_legs: bool) -> HybridSystem:
+def bounder_system(name: str, body: Body, features: Features) -> HybridSystem:
     """Assemble the hybrid system of a body on two legs.
 
-    Without ``damped_legs`` the damping coefficients are taken to be zero, which spares their
-    terms.
+    What belongs to ``features`` that it does not have is taken to be zero, which spares its terms.
     """
     angles = body.coordinates.values()
     states = (
         X, Y, *(a for a, _ in angles), X_RATE, Y_RATE, *(r for _, r in angles), DISSIPATED,
+        *works(features).values(),
     )  # fmt: skip
     built: dict[str, Mode] = {}
 
     def mode(phase: str) -> Mode:
         if phase not in built:
-            built[phase] = _mode(body, phase, damped_legs)
+            built[phase] = _mode(body, phase, features)
         return built[phase]
 
-    conservative = not damped_legs and body.power_lost == 0
+    held = [FORE.toe, HIND.toe, FORE.stanced, HIND.stanced, FORE.left, HIND.left]
+    if features.thrust:
+        held += [FORE.pushes, HIND.pushes]
     return HybridSystem(
         name=name,
         states=states,
-        held=(FORE.toe, HIND.toe, FORE.stanced, HIND.stanced, FORE.left, HIND.left),
+        held=tuple(held),
         parameters=(*body.parameters.values(), FORE.gamma, HIND.gamma),
         modes=PHASES,
         mode=mode,
@@ -170,9 +181,9 @@ def bounder_system(name: str, body: Body, damped_legs: bool) -> HybridSystem:
             missed=NO_APEX,
             mode="DF",
             quantities={"energy": body.kinetic + body.gravity + body.spine},
-            conserved=("energy",) if conservative else (),
+            conserved=("energy",) if features.conservative else (),
         ),
-        reversal=_reversal(body) if conservative else None,
+        reversal=_reversal(body) if features.reversible else None,
         tracked=tuple(f"{side}_grf" for side in SIDES),
     )
 
@@ -214,17 +225,36 @@ def _reversal(body: Body) -> Reversal:
     )
 
 
-def _mode(body: Body, phase: str, damped: bool) -> Mode:
-    stance = stance_legs(body, phase, damped)
+def works(features: Features) -> dict[str, sp.Symbol]:
+    """What actuators do, by public name, in J."""
+    found: dict[str, sp.Symbol] = {}
+    if features.thrust:
+        found |= {f"{leg.side}_leg_work": leg.thrust_work for leg in (FORE, HIND)}
+    if features.hips:
+        found |= {f"{leg.side}_hip_work": leg.hip_work for leg in (FORE, HIND)}
+    if features.switched:
+        found["spine_work"] = SPINE_WORK
+    return found
+
+
+def _mode(body: Body, phase: str, features: Features) -> Mode:
+    stance = stance_legs(body, phase, features)
     standing = {leg.leg.side for leg in stance}
     swing = [SwingLeg(leg, HIP[leg.side]) for leg in (FORE, HIND) if leg.side not in standing]
-    mechanics = lagrangian(body, stance)
+    mechanics = lagrangian(body, phase, stance)
     solving, accelerations = mechanics.accelerations()
     rates = dict(zip(mechanics.coordinates, mechanics.rates, strict=True))
     rates |= dict(zip(mechanics.rates, accelerations, strict=True))
     rates[DISSIPATED] = body.power_lost + sp.Add(*(leg.power_lost for leg in stance))
+    rates |= dict.fromkeys(works(features).values(), sp.S.Zero)
+    if features.hips:
+        rates |= {leg.leg.hip_work: leg.hip_power for leg in stance}
     guards = [leg.touchdown(phase_of(standing | {leg.leg.side})) for leg in swing]
     guards += [leg.liftoff(phase_of(standing - {leg.leg.side}), DISSIPATED) for leg in stance]
+    if body.switched:
+        guards = [_switching(body.switched, body.spine, guard) for guard in guards]
+    if features.thrust:
+        guards += [leg.thrust() for leg in stance]
     if not stance:
         guards.append(Guard("apex", Y_RATE))
     if len(stance) == len(SIDES):
@@ -238,6 +268,14 @@ def _mode(body: Body, phase: str, damped: bool) -> Mode:
     observables = _observables(body, (*stance, *swing))
     observables["leg_energy"] = sp.Add(*(leg.energy for leg in stance))
     return Mode(phase, {**mechanics.definitions, **solving}, rates, tuple(guards), observables)
+
+
+def _switching(spine: SwitchedSpine, energy: sp.Expr, guard: Guard) -> Guard:
+    """A change of phase with the work that the spine's spring takes to change."""
+    assert guard.target is not None
+    fore, hind = (guard.resets.get(flag, flag) for flag in STOOD)
+    work = spine.energy(guard.target, (fore, hind)) - energy
+    return replace(guard, resets={**guard.resets, SPINE_WORK: SPINE_WORK + work})
 
 
 def _observables(body: Body, legs: tuple[StanceLeg | SwingLeg, ...]) -> dict[str, sp.Expr]:

@@ -33,6 +33,7 @@ _SIDE_VARIABLES = {
     "leg_angle": ("rad", "angle of the {} leg from the vertical, foot ahead of the hip positive"),
     "grf_x": ("N", "horizontal ground reaction force on the {} toe, per pair of legs"),
     "grf_y": ("N", "vertical ground reaction force on the {} toe, per pair of legs"),
+    "hip_torque": ("N m", "torque that turns the {} leg backward"),
     "grf": ("N", "magnitude of the ground reaction force on the {} toe, per pair of legs"),
 }
 
@@ -62,6 +63,9 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "spine_energy": ("J", "elastic energy of the spine"),
     "total_energy": ("J", "kinetic, gravity, leg and spine energy"),
     "dissipated_energy": ("J", "energy lost in dampers since the start"),
+    **{f"{side}_leg_work": ("J", f"work of the {side} leg's thrust") for side in SIDES},
+    **{f"{side}_hip_work": ("J", f"work of the {side} hip's torque") for side in SIDES},
+    "spine_work": ("J", "work of changing the spine from phase to phase"),
 }
 
 PHASE_CODES = {phase: code for code, phase in enumerate(PHASES)}

@@ -12,6 +12,15 @@ from functools import lru_cache
 import sympy as sp
 from sympy import cos, sin
 
+from flexspine.models.actuation import (
+    REST_NOW,
+    SPINE_SHIFTS,
+    STIFFNESS_NOW,
+    Features,
+    RestShift,
+    StiffnessShift,
+    SwitchedSpine,
+)
 from flexspine.models.bounder import (
     FORE,
     GRAVITY,
@@ -24,7 +33,7 @@ from flexspine.models.bounder import (
     Y,
     gravity_field,
 )
-from flexspine.models.legs import Leg
+from flexspine.models.legs import LEGS_PARAMETERS, Leg, Legs
 from flexspine.parameters import ParameterSet, quantity
 
 # Parameters
@@ -54,6 +63,8 @@ class Spine(ParameterSet):
     rest_angle: float = quantity(
         "rad", "relative angle without torque", at_least=-1.5, upper=1.5, default=0.0
     )
+    stiffness_shift: StiffnessShift = StiffnessShift()
+    rest_shift: RestShift = RestShift()
 
 
 class FlexibleBounderParameters(ParameterSet):
@@ -62,6 +73,7 @@ class FlexibleBounderParameters(ParameterSet):
     fore: Segment
     hind: Segment
     spine: Spine
+    legs: Legs = Legs()
     gravity: float = gravity_field()
 
 
@@ -94,7 +106,7 @@ FORE_HALF, HIND_HALF = SegmentSymbols("fore"), SegmentSymbols("hind")
 
 
 @lru_cache
-def _body(damped_spine: bool) -> Body:
+def _body(features: Features) -> Body:
     fore, hind = FORE_HALF, HIND_HALF
     # How far the CoM is moved by a unit vector along each segment, seen from the joint.
     lever_f, lever_h, coupling = sp.symbols("b_f b_h B", real=True)
@@ -108,7 +120,7 @@ def _body(damped_spine: bool) -> Body:
         coupling: MU * fore.a * hind.a,
         BEND: F - H,
         BEND_RATE: F_RATE - H_RATE,
-        TWIST: BEND - REST,
+        TWIST: BEND - (REST_NOW if features.switched else REST),
     }
     joint = (
         X - lever_f * cos(F) + lever_h * cos(H),
@@ -120,7 +132,8 @@ def _body(damped_spine: bool) -> Body:
         "hind": (X - lever_f * cos(F) - reach_h * cos(H), Y - lever_f * sin(F) - reach_h * sin(H)),
     }
     # Energies. The two CoMs move against each other with velocity a_f f' + a_h h'.
-    torque = K_T * TWIST
+    stiffness = STIFFNESS_NOW if features.switched else K_T
+    torque = stiffness * TWIST
     return Body(
         coordinates={"fore_pitch": (F, F_RATE), "hind_pitch": (H, H_RATE)},
         mirror={"fore_pitch": "hind_pitch", "hind_pitch": "fore_pitch"},
@@ -132,6 +145,8 @@ def _body(damped_spine: bool) -> Body:
             "spine.stiffness": K_T,
             "spine.damping": C_T,
             "spine.rest_angle": REST,
+            **SPINE_SHIFTS,
+            **LEGS_PARAMETERS,
             "gravity": GRAVITY,
         },
         definitions=definitions,
@@ -140,15 +155,17 @@ def _body(damped_spine: bool) -> Body:
         + hind.A * H_RATE**2 / 2
         + coupling * cos(BEND) * F_RATE * H_RATE,
         gravity=M * GRAVITY * Y,
-        spine=K_T * TWIST**2 / 2,
-        power_lost=C_T * BEND_RATE**2 if damped_spine else sp.S.Zero,
+        pitches={"fore": (F, F_RATE), "hind": (H, H_RATE)},
+        spine=stiffness * TWIST**2 / 2,
+        switched=SwitchedSpine(F - H, K_T, REST) if features.switched else None,
+        power_lost=C_T * BEND_RATE**2 if features.damped_spine else sp.S.Zero,
         hips=hips,
         low_points={"spine joint": joint[1]},
         observables={
             "spine_joint_x": joint[0],
             "spine_joint_y": joint[1],
             "spine_angle": BEND,
-            "spine_torque": torque + C_T * BEND_RATE if damped_spine else torque,
+            "spine_torque": torque + C_T * BEND_RATE if features.damped_spine else torque,
         },
     )
 

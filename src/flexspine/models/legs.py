@@ -2,7 +2,7 @@
 
 A leg pair acts as one leg. In flight it keeps its rest length and its touchdown angle from the
 vertical, foot ahead of the hip positive. In stance the toe is a frictionless pin on flat ground.
-Source: Kamimura et al. 2015, Artif Life Robotics 20:270-275; damping is an addition.
+Source: Kamimura et al. 2015, Artif Life Robotics 20:270-275; dampers and actuators are additions.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import sympy as sp
 
 from flexspine.hybrid.system import Arming, Guard
 from flexspine.mechanics.lagrangian import AppliedForce, Lagrangian, time_derivative
+from flexspine.models.actuation import Features, extension, hip_lever, stiffening
 from flexspine.parameters import ParameterSet, quantity
 
 SIDES = ("fore", "hind")
@@ -42,6 +43,26 @@ class Leg(ParameterSet):
         "N s/m", "leg damping, per pair of legs", at_least=0, upper=1e6, default=0.0
     )
     rest_length: float = quantity("m", "unloaded leg length", above=0, upper=100)
+    stiffening: float = stiffening()
+    extension: float = extension()
+    hip_lever: float = hip_lever()
+
+
+class Legs(ParameterSet):
+    """Actuators of both pairs of legs, added to what each pair has of its own."""
+
+    stiffening: float = stiffening()
+    extension: float = extension()
+    hip_lever: float = hip_lever()
+
+
+# The same of both legs.
+STIFFENING, EXTENSION, LEVER = sp.symbols("zeta xi d", real=True)
+LEGS_PARAMETERS = {
+    "legs.stiffening": STIFFENING,
+    "legs.extension": EXTENSION,
+    "legs.hip_lever": LEVER,
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +70,8 @@ class LegSymbols:
     """The letters of one leg: parameters, touchdown angle, and what it remembers.
 
     ``toe`` is where it stands or stood last (m), ``stanced`` whether it stood since the apex,
-    ``left`` its angle from the vertical at its latest lift-off (rad).
+    ``left`` its angle from the vertical at its latest lift-off (rad), ``pushes`` whether its thrust
+    has set in. The works of thrust and hip flow, in J.
     """
 
     side: str
@@ -60,6 +82,12 @@ class LegSymbols:
     toe: sp.Symbol
     stanced: sp.Symbol
     left: sp.Symbol
+    stiffening: sp.Symbol
+    extension: sp.Symbol
+    lever: sp.Symbol
+    pushes: sp.Symbol
+    thrust_work: sp.Symbol
+    hip_work: sp.Symbol
 
     @classmethod
     def of(cls, side: str) -> LegSymbols:
@@ -69,9 +97,38 @@ class LegSymbols:
             side,
             *(
                 sp.Symbol(f"{letter}_{s}", real=True)
-                for letter in ("k", "c", "l", "gamma", "s", "n", "beta")
+                for letter in (
+                    "k",
+                    "c",
+                    "l",
+                    "gamma",
+                    "s",
+                    "n",
+                    "beta",
+                    "zeta",
+                    "xi",
+                    "d",
+                    "p",
+                    "W_l",
+                    "W_h",
+                )
             ),
         )
+
+    @property
+    def all_stiffening(self) -> sp.Expr:
+        """What it has of its own, and what all legs have."""
+        return STIFFENING + self.stiffening
+
+    @property
+    def all_extension(self) -> sp.Expr:
+        """What it has of its own, and what all legs have."""
+        return EXTENSION + self.extension
+
+    @property
+    def all_lever(self) -> sp.Expr:
+        """What it has of its own, and what all legs have."""
+        return LEVER + self.lever
 
     @property
     def parameters(self) -> Symbols:
@@ -80,6 +137,9 @@ class LegSymbols:
             f"{self.side}.leg.stiffness": self.k,
             f"{self.side}.leg.damping": self.c,
             f"{self.side}.leg.rest_length": self.length,
+            f"{self.side}.leg.stiffening": self.stiffening,
+            f"{self.side}.leg.extension": self.extension,
+            f"{self.side}.leg.hip_lever": self.lever,
         }
 
 
@@ -88,7 +148,9 @@ class StanceLeg:
 
     With the vector from toe to hip ``(u, Y)`` and its length ``l``, the leg force is
     ``F = k (l0 - l) - c l'``; what is computed is the strain-like ``sigma = F / (k l)``, which
-    needs one root only, vanishes with the force and gives the force vector ``k sigma (u, Y)``.
+    needs one root only, vanishes with the force and gives the force vector ``k sigma (u, Y)``. A
+    hip torque ``d F`` adds ``k sigma d / l (Y, -u)`` and turns the body the other way. ``pitch`` is
+    that of what carries the hip: angle and rate.
     """
 
     def __init__(
@@ -96,66 +158,104 @@ class StanceLeg:
         leg: LegSymbols,
         hip: tuple[sp.Symbol, sp.Symbol],
         hip_velocity: tuple[sp.Expr, sp.Expr],
-        damped: bool,
+        pitch: tuple[sp.Symbol, sp.Symbol],
+        features: Features,
     ) -> None:
         s = leg.side[0]
-        u, inverse, stretching, sigma = (
-            sp.Symbol(f"{letter}_{s}", real=True) for letter in ("u", "r", "w", "sigma")
+        u, inverse, stretching, sigma, stiffness, length = (
+            sp.Symbol(f"{letter}_{s}", real=True) for letter in ("u", "r", "w", "sigma", "K", "L")
         )
-        self.leg, self.hip = leg, hip
-        self.u, self.inverse, self.sigma = u, inverse, sigma
+        self.leg, self.hip, self._features = leg, hip, features
+        self.u, self.inverse, self.sigma, self.stretching = u, inverse, sigma, stretching
         self.definitions: dict[sp.Symbol, sp.Expr] = {
             u: hip[0] - leg.toe,
             inverse: (u**2 + hip[1] ** 2) ** sp.Rational(-1, 2),
         }
-        strain = leg.length * inverse - 1
-        self.rate: sp.Expr = sp.S.Zero
-        if damped:
+        self._stiffness, self._length = leg.k, leg.length
+        if features.thrust:
+            self._stiffness, self._length = stiffness, length
+            self.definitions[stiffness] = leg.k * (1 + leg.all_stiffening * leg.pushes)
+            self.definitions[length] = leg.length + leg.all_extension * leg.pushes
+        strain = self._length * inverse - 1
+        if features.damped_legs or features.thrust:
             self.definitions[stretching] = (
                 u * hip_velocity[0] + hip[1] * hip_velocity[1]
             ) * inverse
-            self.rate = stretching
-            strain -= leg.c / leg.k * stretching * inverse
+        if features.damped_legs:
+            strain -= leg.c / self._stiffness * stretching * inverse
         self.definitions[sigma] = strain
         pushes = sp.symbols(f"F_{s}x F_{s}y", real=True)
-        for push, along in zip(pushes, (u, hip[1]), strict=True):
-            self.definitions[push] = leg.k * sigma * along
+        along: tuple[sp.Expr, sp.Expr] = (u, hip[1])
+        if features.hips:
+            turn = leg.all_lever * inverse
+            along = (u + turn * hip[1], hip[1] - turn * u)
+        for push, way in zip(pushes, along, strict=True):
+            self.definitions[push] = self._stiffness * sigma * way
         # The force of the leg on its hip; the ground reaction force has the same components.
         self.force = AppliedForce(pushes, hip)
+        self.hip_power: sp.Expr = sp.S.Zero
+        self.applied: tuple[AppliedForce, ...] = (self.force,)
+        if features.hips:
+            torque = leg.all_lever * self._stiffness * sigma / inverse
+            swing = (u * hip_velocity[1] - hip[1] * hip_velocity[0]) * inverse**2
+            self.hip_power = torque * (pitch[1] - swing)
+            self.applied += (AppliedForce((torque,), (pitch[0],)),)
 
     @property
     def energy(self) -> sp.Expr:
         """Elastic energy, in J."""
-        return self.leg.k * (self.leg.length - 1 / self.inverse) ** 2 / 2
+        return self._energy(self._stiffness, self._length)
+
+    def _energy(self, stiffness: sp.Expr, length: sp.Expr) -> sp.Expr:
+        return stiffness * (length - 1 / self.inverse) ** 2 / 2
 
     @property
     def power_lost(self) -> sp.Expr:
         """Power that goes into the damper, in W."""
-        return self.leg.c * self.rate**2
+        return self.leg.c * self.stretching**2 if self._features.damped_legs else sp.S.Zero
 
     def liftoff(self, target: str, dissipated: sp.Symbol) -> Guard:
         """The leg leaves the ground when its force falls to zero; it never pulls.
 
-        A damper reaches zero force while the spring is still compressed. The leg is massless, so
-        that energy is lost at the instant of release.
+        A damper reaches zero force while the spring is still compressed, and a leg that gets
+        shorter may be released stretched. The leg is massless, so that energy is lost at the
+        instant of release.
         """
         resets = {self.leg.left: sp.atan(-self.u / self.hip[1])}
-        if self.rate != 0:
+        if self._features.damped_legs or self._features.thrust:
             resets[dissipated] = dissipated + self.energy
+        if self._features.thrust:
+            resets[self.leg.pushes] = sp.S.Zero
         return Guard(f"{self.leg.side} lift-off", self.sigma, target, resets, arming=Arming.LEVEL)
+
+    def thrust(self) -> Guard:
+        """At its greatest compression the leg begins to push, once a stance."""
+        leg = self.leg
+        pushing = leg.k * (1 + leg.all_stiffening), leg.length + leg.all_extension
+        work = self._energy(*pushing) - self._energy(leg.k, leg.length)
+        return Guard(
+            f"{leg.side} greatest compression",
+            leg.pushes - (1 - leg.pushes) * self.stretching,
+            resets={leg.pushes: sp.S.One, leg.thrust_work: leg.thrust_work + work},
+        )
 
     def observables(self) -> dict[str, sp.Expr]:
         """Toe, length, angle and ground reaction force."""
         side, leg, (_, height) = self.leg.side, self.leg, self.hip
-        return {
+        force = self._stiffness * self.sigma / self.inverse
+        table = {
             f"{side}_toe_x": leg.toe,
             f"{side}_toe_y": sp.S.Zero,
             f"{side}_leg_length": 1 / self.inverse,
             f"{side}_leg_angle": sp.atan2(-self.u, height),
             f"{side}_grf_x": self.force.components[0],
             f"{side}_grf_y": self.force.components[1],
-            f"{side}_grf": leg.k * self.sigma / self.inverse,
+            f"{side}_grf": force,
         }
+        if self._features.hips:
+            table[f"{side}_grf"] = force * sp.sqrt(1 + (leg.all_lever * self.inverse) ** 2)
+            table[f"{side}_hip_torque"] = leg.all_lever * force
+        return table
 
 
 class SwingLeg:

@@ -10,8 +10,10 @@ from functools import lru_cache
 
 import sympy as sp
 
+from flexspine.models.actuation import Features
 from flexspine.models.bounder import FORE, GRAVITY, HIND, Body, BounderKind, gravity_field
 from flexspine.models.flexible_bounder import FORE_HALF, HIND_HALF, MU, Segment
+from flexspine.models.legs import LEGS_PARAMETERS, Legs
 from flexspine.models.rigid_bounder import H_F, H_H, INERTIA, M, rigid_body
 from flexspine.parameters import ParameterSet
 
@@ -23,6 +25,7 @@ class LockedBounderParameters(ParameterSet):
 
     fore: Segment
     hind: Segment
+    legs: Legs = Legs()
     gravity: float = gravity_field()
 
 
@@ -30,7 +33,7 @@ class LockedBounderParameters(ParameterSet):
 
 
 @lru_cache
-def _body(_damped_spine: bool) -> Body:
+def _body(_features: Features) -> Body:
     fore, hind = FORE_HALF, HIND_HALF
     ahead = sp.Symbol("b", real=True)
     constants = {
@@ -46,6 +49,7 @@ def _body(_damped_spine: bool) -> Body:
         **FORE.parameters,
         **hind.parameters,
         **HIND.parameters,
+        **LEGS_PARAMETERS,
         "gravity": GRAVITY,
     }
     return rigid_body(parameters, constants)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf, pi
@@ -14,7 +14,8 @@ from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.compile import Array, BoundSystem, compile_system
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
-from flexspine.models.bounder import BounderKind
+from flexspine.models.actuation import BARE, Features
+from flexspine.models.bounder import FORE, HIND, BounderKind, works
 from flexspine.models.legs import SIDES, phase_of
 from flexspine.parameters import ParameterSet, is_number, replaced, shortened, values
 
@@ -49,7 +50,8 @@ class Model:
     """A bounder ready to run. All values in SI and radians.
 
     ``apex`` is the start, by section coordinate; ``touchdown`` the angle of each leg from the
-    vertical at touchdown, foot ahead of the hip positive.
+    vertical at touchdown, foot ahead of the hip positive. ``kept`` are dampers and actuators
+    whose terms stay in the equations even where their numbers vanish.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Model:
     apex: Mapping[str, float]
     touchdown: Mapping[str, float]
     source: Source
+    kept: Features = BARE
 
     def __post_init__(self) -> None:
         coordinates = self.system.section.coordinates
@@ -111,18 +114,28 @@ class Model:
     @cached_property
     def system(self) -> HybridSystem:
         """The hybrid system behind the model."""
-        return self.kind.system(self.parameters)
+        return self.kind.system(self.features)
+
+    @cached_property
+    def features(self) -> Features:
+        """The dampers and actuators that its equations know."""
+        return Features.of(values(self.parameters)) | self.kept
+
+    def keeping(self, names: Iterable[str]) -> Model:
+        """Return the same model, its equations ready for these parameters to be other than zero."""
+        return replace(self, kept=self.kept | Features.of(dict.fromkeys(names, 1.0)))
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
         """Public names of the states, in order."""
-        coordinates = ("com_x", "com_y", *self.kind.body(False).coordinates)
-        return (*coordinates, *(f"{name}_rate" for name in coordinates), "dissipated_energy")
+        coordinates = ("com_x", "com_y", *self.kind.body(BARE).coordinates)
+        rates = (f"{name}_rate" for name in coordinates)
+        return (*coordinates, *rates, "dissipated_energy", *works(self.features))
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Dotted names of ``system.parameters``, in order; the touchdown angles come last."""
-        return (*self.kind.body(False).parameters, *(f"touchdown.{side}" for side in SIDES))
+        return (*self.kind.body(BARE).parameters, *(f"touchdown.{side}" for side in SIDES))
 
     @cached_property
     def numbers(self) -> dict[str, float]:
@@ -135,9 +148,9 @@ class Model:
         """Whether the fore and the hind end have the same parameters."""
         given = values(self.parameters)
         return all(
-            value == given[name.replace("fore", "hind", 1)]
+            value == given[name.replace("fore", "hind")]
             for name, value in given.items()
-            if name.startswith("fore.")
+            if "fore" in name.split(".")
         )
 
     @cached_property
@@ -168,7 +181,7 @@ class Model:
     def parameter_vector(self) -> Array:
         """Parameters and touchdown angles in the order of ``system.parameters``."""
         given = values(self.parameters)
-        body = self.kind.body(False)
+        body = self.kind.body(BARE)
         return np.array(
             [*(given[name] for name in body.parameters), *(self.touchdown[s] for s in SIDES)]
         )
@@ -198,13 +211,10 @@ class Model:
         _check_numbers("state", {**dict.fromkeys(self.state_names, 0.0), **start}, self.state_names)
         _check_numbers("toe", {**dict.fromkeys(SIDES, 0.0), **toes}, SIDES)
         states = np.array([float(start.get(name, 0.0)) for name in self.state_names])
-        held = np.array(
-            [
-                *(float(toes.get(s, states[0])) for s in SIDES),
-                *(float(s in toes) for s in SIDES),
-                *(0.0 for _ in SIDES),
-            ]
-        )
+        held = np.zeros(len(self.system.held))
+        for leg in (FORE, HIND):
+            held[self.system.places[leg.toe]] = toes.get(leg.side, states[0])
+            held[self.system.places[leg.stanced]] = leg.side in toes
         return HybridState(0.0, phase_of(toes), states, held)
 
 

@@ -11,6 +11,7 @@ from functools import lru_cache
 import sympy as sp
 from sympy import cos, sin
 
+from flexspine.models.actuation import Features
 from flexspine.models.bounder import (
     FORE,
     GRAVITY,
@@ -23,7 +24,7 @@ from flexspine.models.bounder import (
     Y,
     gravity_field,
 )
-from flexspine.models.legs import Leg
+from flexspine.models.legs import LEGS_PARAMETERS, SIDES, Leg, Legs
 from flexspine.parameters import ParameterSet, quantity
 
 # Parameters
@@ -49,6 +50,7 @@ class RigidBounderParameters(ParameterSet):
     body: Trunk
     fore: End
     hind: End
+    legs: Legs = Legs()
     gravity: float = gravity_field()
 
 
@@ -70,6 +72,7 @@ def rigid_body(parameters: dict[str, sp.Symbol], constants: dict[sp.Symbol, sp.E
         definitions=constants,
         kinetic=M * (X_RATE**2 + Y_RATE**2) / 2 + INERTIA * THETA_RATE**2 / 2,
         gravity=M * GRAVITY * Y,
+        pitches=dict.fromkeys(SIDES, (THETA, THETA_RATE)),
         hips={
             "fore": (X + H_F * cos(THETA), Y + H_F * sin(THETA)),
             "hind": (X - H_H * cos(THETA), Y - H_H * sin(THETA)),
@@ -78,7 +81,7 @@ def rigid_body(parameters: dict[str, sp.Symbol], constants: dict[sp.Symbol, sp.E
 
 
 @lru_cache
-def _body(_damped_spine: bool) -> Body:
+def _body(_features: Features) -> Body:
     parameters = {
         "body.mass": M,
         "body.inertia": INERTIA,
@@ -86,6 +89,7 @@ def _body(_damped_spine: bool) -> Body:
         **FORE.parameters,
         "hind.hip_offset": H_H,
         **HIND.parameters,
+        **LEGS_PARAMETERS,
         "gravity": GRAVITY,
     }
     return rigid_body(parameters, {})
