@@ -34,6 +34,11 @@ class Quantity:
     lower_is_open: bool
 
     @property
+    def told(self) -> str:
+        """The bounds with their unit."""
+        return self.bounds if self.unit == "1" else f"{self.bounds} {self.unit}"
+
+    @property
     def bounds(self) -> str:
         """The bounds as an interval, such as ``(0, 1e+06]``."""
         return f"{'(' if self.lower_is_open else '['}{self.lower:g}, {self.upper:g}]"
@@ -192,5 +197,5 @@ def _explained(failure: ValidationError, declared: Mapping[str, Quantity]) -> Pa
     about = declared[name]
     return ParameterError(
         f"parameter '{name}' = {shortened(fault['input'])} is not usable",
-        f"give a number in {about.bounds} {about.unit} ({about.meaning})",
+        f"give a number in {about.told} ({about.meaning})",
     )

@@ -32,9 +32,19 @@ def test_a_person_is_told_how_it_went(cli: Cli) -> None:
     lines = done.stdout.splitlines()
     assert lines[0].startswith("sc618: completed")
     told = {line.split()[0]: line for line in lines[1:]}
-    assert "0.3000 m/s" in told["speed"]
-    assert "7 steps" in told["speed"]
-    for name in ("normal", "friction", "torque", "impacts", "tracking", "foot", "spine", "energy"):
+    assert "0.3000 m/s" in told["steady"]
+    assert "7 steps" in told["steady"]
+    for name in (
+        "normal",
+        "peak",
+        "friction",
+        "torque",
+        "impacts",
+        "tracking",
+        "foot",
+        "spine",
+        "energy",
+    ):
         assert name in told
 
 
@@ -140,6 +150,9 @@ BAD = {
     "tolerance": (["--tolerance", "7"], "tolerance"),
     "unknown option": (["--speed", "3"], "--speed"),
     "two controllers": (["--compare", "--controller", "pd"], "--controller and --compare"),
+    "the usual one": (["--compare", "--controller", "tracking"], "--controller and --compare"),
+    "gains of two": (["--compare", "--damping", "3"], "--damping and --compare"),
+    "no stiffness": (["--stiffness", "-1"], "stiffness"),
     "a clock of two": (["--compare", "--rate", "400"], "--rate and --compare"),
     "limits of two": (["--compare", "--limit", "10"], "--limit and --compare"),
 }

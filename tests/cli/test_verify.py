@@ -98,7 +98,8 @@ def test_a_missing_mujoco_is_exit_code_3(
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err == (
-        "flexspine: the package 'mujoco' is not installed; pip install 'flexspine[engine]'\n"
+        "flexspine: the package 'mujoco' is not installed; pip install 'mujoco>=3.17,<4', "
+        "or flexspine with the extra 'engine'\n"
     )
     assert app.run([*QUICK, "--json"]) == 3
     assert json.loads(capsys.readouterr().out)["error"] == "environment"

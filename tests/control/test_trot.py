@@ -507,7 +507,7 @@ def test_a_slow_clock_shakes_stiff_joints_out_of_control() -> None:
     """With 800 N m/rad on 1e-3 kg m^2 joints swing far more often than a hundred times a second."""
     run = trot(ROBOT, Trot(seconds=2.0, controller="pd", stiffness=800.0, rate=100.0))
     assert run.outcome.name == "out_of_control"
-    assert "rad/s" in run.outcome.message
+    assert "too fast" in run.outcome.message
     assert "sample more often" in run.outcome.advice
 
 

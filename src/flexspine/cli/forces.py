@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -84,8 +85,7 @@ def forces(
     for name in places:
         if name not in legs:
             raise UnknownNameError("leg", name, legs)
-    reach = min(leg.reach for leg in legs.values())
-    check_between("--height", height, 0, reach)
+    check_between("--height", height, 0, inf)
     q = standing(made, height, places)
     family = force_family(made.linkage, q, feet, locked=lock or [])
     chosen = family.choose(Aim(aim), made.friction, _shares(feet, share, aim))
@@ -102,6 +102,8 @@ def _feet(robot: Robot, given: list[str] | None) -> list[str]:
     for name in given or []:
         if name not in robot.feet:
             raise UnknownNameError("foot", name, robot.feet)
+        if (given or []).count(name) > 1:
+            raise InputError(f"--foot {name} is given twice", "name each foot once")
     return [name for name in robot.feet if given is None or name in given]
 
 

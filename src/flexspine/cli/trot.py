@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 OF_GAIT = "gait."
 
 # What a trot writes, in which an earlier one's pictures would pass for its own.
-PICTURES = re.compile(r"(figure|animation|comparison)\.(png|mp4|gif|csv)")
+PICTURES = re.compile(r"(figure|animation|comparison|(com|pd)-.*)\.(png|mp4|gif|csv|nc)")
 
 RobotAssignments = Annotated[
     list[str] | None,
@@ -49,13 +49,13 @@ def trot(
     set_: RobotAssignments = None,
     seconds: Annotated[float, typer.Option(help="How long to trot, in s.")] = 20.0,
     controller: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="tracking (computed torque of all joints), qp (the same within friction and "
-            "limits), com (centre of mass, pitch, swing legs; the spine moves), pd (springs "
+            help="tracking (default: computed torque of all joints), qp (the same within friction "
+            "and limits), com (centre of mass, pitch, swing legs; the spine moves), pd (springs "
             "and dampers at the joints) or cpg (the same, drawn after coupled oscillators)."
         ),
-    ] = "tracking",
+    ] = None,
     rate: Annotated[
         float | None,
         typer.Option(
@@ -65,6 +65,14 @@ def trot(
     ] = None,
     limit: Annotated[
         float | None, typer.Option(help="Largest torque of a motor, in N m; needs --rate.")
+    ] = None,
+    stiffness: Annotated[
+        float | None,
+        typer.Option(help="Of the law: in 1/s^2, for pd and cpg in N m/rad (default 400, 300)."),
+    ] = None,
+    damping: Annotated[
+        float | None,
+        typer.Option(help="Of the law: in 1/s, for pd and cpg in N m s/rad (default 40, 4)."),
     ] = None,
     push: Annotated[
         float, typer.Option(help="Push the hind trunk forward by this many N s, half-way.")
@@ -93,6 +101,7 @@ def trot(
         flexspine trot --compare --out results/spines
     """
     from flexspine.cli.results import ResultDirectory
+    from flexspine.control.laws import Tracking
     from flexspine.control.spine_comparison import compare_spines
     from flexspine.control.trot import Trot
     from flexspine.control.trot import trot as run_trot
@@ -107,22 +116,32 @@ def trot(
     made = load_robot(robot, own)
     asked = Trot(
         seconds=seconds,
-        controller=controller,
+        controller=controller or Tracking.name,
         gait=_gait({n.removeprefix(OF_GAIT): v for n, v in given.items() if n not in own}),
         rate=rate,
         limit=limit,
+        stiffness=stiffness,
+        damping=damping,
         push=push,
     )
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         if compare:
-            _refuse_besides_compare(controller, rate, limit)
+            _refuse_besides_compare(
+                {
+                    "--controller": controller,
+                    "--rate": rate,
+                    "--limit": limit,
+                    "--stiffness": stiffness,
+                    "--damping": damping,
+                }
+            )
             progress.begin("trotting, six times")
             found = compare_spines(made, asked, progress.at)
             if directory is not None:
                 with directory.stage(PICTURES) as stage:
-                    _write_comparison(stage, found)
+                    _write_comparison(stage, found, progress)
             _tell(found, json, out)
             return 0 if all(run.outcome.completed for run in found.runs.values()) else 1
         progress.begin("trotting")
@@ -162,13 +181,9 @@ def _gait(given: Mapping[str, float]) -> Pace:
     return Pace(**changes)
 
 
-def _refuse_besides_compare(controller: str, rate: float | None, limit: float | None) -> None:
-    for option, changed in (
-        ("--controller", controller != "tracking"),
-        ("--rate", rate is not None),
-        ("--limit", limit is not None),
-    ):
-        if changed:
+def _refuse_besides_compare(given: Mapping[str, object]) -> None:
+    for option, value in given.items():
+        if value is not None:
             raise InputError(
                 f"{option} and --compare are both given",
                 f"leave {option}, as controllers com and pd are compared",
@@ -222,10 +237,20 @@ def _table(found: SpineComparison) -> list[tuple[str, str, list[float | None]]]:
     return [*table, ("range of the spine's angle", "rad", [*spans])]
 
 
-def _write_comparison(stage: Path, found: SpineComparison) -> None:
+def _write_comparison(stage: Path, found: SpineComparison, progress: Steps) -> None:
     import csv
 
     from flexspine.cli.results import write_json
+    from flexspine.models.files import write_netcdf
+    from flexspine.models.robot_run import robot_dataset
+    from flexspine.report.robot_figure import plot_robot
+
+    for case, run in found.runs.items():
+        name = "-".join(case)
+        progress.begin(f"drawing {name}")
+        dataset = robot_dataset(run)
+        write_netcdf(dataset, stage / f"{name}.nc")
+        plot_robot(dataset).savefig(stage / f"{name}.png")
 
     with (stage / "comparison.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -275,12 +300,13 @@ def _report(run: RobotRun, summary: WalkSummary) -> str:
         lines.append(f"  advice           {run.outcome.advice}")
     if summary.speed is not None:
         lines.append(
-            f"  speed            {summary.speed:.4f} m/s, {summary.distance:.3f} m in "
-            f"{summary.steps} steps"
+            f"  steady speed     {summary.speed:.4f} m/s; {summary.distance:.3f} m in "
+            f"{summary.steps} steps, the start included"
         )
     low, high = summary.normal
     lines += [
-        f"  normal forces    {low:.1f} to {high:.1f} N on feet that are to stand",
+        f"  normal forces    {max(low, 0.0):.1f} to {high:.1f} N on feet that are to stand",
+        f"  peak force       {summary.peak_force:.1f} N on any foot",
         f"  friction demand  {summary.friction_demand:.3f}, sliding "
         f"{100 * summary.sliding:.2f} % of the time",
         f"  torque           up to {summary.torque:.2f} N m",

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import sympy as sp
 
+from flexspine.control.joint_speed import speed_guard
 from flexspine.hybrid.compile import Array, BoundSystem
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
@@ -20,18 +21,9 @@ from flexspine.models.drive import Drive, Moment, Turning
 
 NEXT_SAMPLE = sp.Symbol("next_sample", real=True)
 
-# rad/s; no joint of a robot that is under control turns as fast.
-FASTEST = 1e3
-
 NO_TORQUES = OutcomeKind(
     "no_torques",
     "no torques do what the law wants; take another posture, shorter steps, or higher limits",
-)
-
-OUT_OF_CONTROL = OutcomeKind(
-    "out_of_control",
-    "torques that are held for so long shake the joints ever more; sample more often, or lower "
-    "the stiffness and damping of the law",
 )
 
 
@@ -49,7 +41,7 @@ class Clocked(Drive):
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
         """Torques are held."""
         definitions, observables = self.observed()
-        return Turning(self.held_torques, definitions, observables)
+        return Turning(self.held_torques, definitions, observables, (speed_guard(motion),))
 
     def observed(self) -> tuple[Mapping[sp.Symbol, sp.Expr], Mapping[str, sp.Expr]]:
         """What else is worth observing, in terms of definitions."""
@@ -94,10 +86,6 @@ def _sampled(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | 
     assert isinstance(bound, BoundRobot)
     drive, moment = bound.drive, bound.moment(point)
     assert isinstance(drive, Clocked)
-    fastest = float(np.abs(moment.rates[:-2]).max())
-    if not fastest < FASTEST:
-        text = f"a joint turns at {fastest:.3g} rad/s at t = {moment.time:.6g} s"
-        return Outcome(OUT_OF_CONTROL, text)
     try:
         chosen = drive.sample(moment)
     except np.linalg.LinAlgError as failure:

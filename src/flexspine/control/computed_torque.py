@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
+from flexspine.control.joint_speed import speed_guard
 from flexspine.control.laws import Tracking
 from flexspine.control.references import References
 from flexspine.control.walking import Walker
@@ -61,7 +62,7 @@ class ComputedTorque(Walker):
         assert counted is not None
         wanted = wanted_accelerations(self.references, motion)
         found = follow(motion, [Standing(foot, anchor(foot)) for foot in counted], wanted)
-        known, guards = BY not in mode, []
+        known, guards = BY not in mode, [speed_guard(motion)]
         if found.closeness is not None:
             apart = found.closeness**2 - CLOSEST**2
             guards.append(Guard("feet and spine in line", apart, ends=SINGULAR))

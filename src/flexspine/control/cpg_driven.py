@@ -28,7 +28,7 @@ class CpgDriven(Clocked):
     """Step by the rhythm of oscillators, without sense of the ground."""
 
     pattern: Cpg = field(kw_only=True)
-    springs: JointSprings = field(default_factory=JointSprings)
+    law: JointSprings = field(default_factory=JointSprings)
 
     @cached_property
     def legs(self) -> dict[str, Leg]:
@@ -57,7 +57,7 @@ class CpgDriven(Clocked):
         beat = self._beat(moment.held)
         angles, rates = self.joints(beat)
         motors = self.robot.linkage.actuation.T
-        torques = self.springs.pull(angles - motors @ moment.q, rates - motors @ moment.rates)
+        torques = self.law.pull(angles - motors @ moment.q, rates - motors @ moment.rates)
         following = self.pattern.advance(beat, moment.time, 1 / self.rate)
         numbers = [*following.phases.tolist(), following.amplitude, following.amplitude_rate]
         remembered = dict(zip(self._beat_symbols, numbers, strict=True))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
+from flexspine.control.joint_speed import speed_guard
 from flexspine.control.laws import JointSprings
 from flexspine.control.walking import Walker
 from flexspine.hybrid.compile import Array
@@ -20,11 +21,11 @@ STIFFNESS, DAMPING = sp.symbols("joint_stiffness joint_damping", real=True)
 class SpringDriven(Walker):
     """Walk on joints that give way; the spine bends as forces make it."""
 
-    springs: JointSprings = field(default_factory=JointSprings)
+    law: JointSprings = field(default_factory=JointSprings)
 
     def values(self) -> dict[sp.Symbol, float]:
         """The springs and dampers, and what the legs measure."""
-        own = {STIFFNESS: self.springs.stiffness, DAMPING: self.springs.damping}
+        own = {STIFFNESS: self.law.stiffness, DAMPING: self.law.damping}
         return super().values() | own
 
     def turning(self, motion: LinkageMotion, mode: str) -> Turning:
@@ -34,8 +35,13 @@ class SpringDriven(Walker):
             + DAMPING * (rate - motion.bend_rate(joint))
             for joint, (angle, rate, _) in self.references.joints.items()
         }
-        return Turning(torques, self.references.definitions, self.observed_references)
+        return Turning(
+            torques,
+            self.references.definitions,
+            self.observed_references,
+            (speed_guard(motion),),
+        )
 
     def torques_at(self, bound: BoundRobot, moment: Moment, states: Array) -> Array:
         """The same in numbers."""
-        return self.springs.torques(self.situation(moment))
+        return self.law.torques(self.situation(moment))

@@ -48,6 +48,8 @@ class Law(ABC):
     """How torques are chosen."""
 
     name: str
+    stiffness: float
+    damping: float
 
     @abstractmethod
     def torques(self, now: Situation) -> Array:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import hypot
 
 import numpy as np
 import sympy as sp
 
 from flexspine.control.references import ReferenceFunction, leg_numbers, references
+from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.models.leg_geometry import Leg, legs_of
 from flexspine.models.robot import Robot
@@ -61,8 +63,15 @@ def standing(robot: Robot, height: float, ahead: Mapping[str, float]) -> Array:
     """``q`` of a robot that stands still with its hips at ``height`` (m).
 
     Feet are below their hips, or ``ahead`` of them by so many m, by leg. Raises `ParameterError`
-    for a robot without legs to stand on.
+    for a robot without legs to stand on, and for feet that are out of reach.
     """
     legs = legs_of(robot)
+    for name, leg in legs.items():
+        off, folded = ahead.get(name, 0.0), abs(leg.thigh_length - leg.shank_length)
+        if not folded < hypot(height, off) < leg.reach:
+            raise ParameterError(
+                f"leg '{name}' cannot put its foot {height:g} m below its hip and {off:g} m ahead",
+                f"keep it between {folded:g} m and {leg.reach:g} m from the hip",
+            )
     place = [[leg.hip + ahead.get(name, 0.0), -height] for name, leg in legs.items()]
     return LegFunction(robot, legs).posture(np.array(place))

@@ -15,7 +15,7 @@ from flexspine.control.laws import JointSprings, Law, LeastResidual, SevenOutput
 from flexspine.control.leg_pairs import diagonal_pairs
 from flexspine.control.sampled import Sampled
 from flexspine.control.walk_plan import Pace
-from flexspine.control.walking import LONGEST, Walker
+from flexspine.control.walking import LONGEST
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
@@ -38,6 +38,9 @@ USUAL_RATES = {LeastResidual.name: 400.0, SevenOutputs.name: 400.0, OSCILLATORS:
 
 # Of its cycle that a leg stands under oscillators; feet then overlap a little.
 DUTY = 0.55
+
+
+Driven = ComputedTorque | Sampled | SpringDriven | CpgDriven
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,8 @@ def trot(
             for each in fields(Trot)
             if each.name not in ("controller", "rate", "gait")
         },
+        "stiffness": drive.law.stiffness,
+        "damping": drive.law.damping,
     }
     settings = {name: None if value == inf else value for name, value in settings.items()}
     if isinstance(start, Outcome):
@@ -103,7 +108,7 @@ def trot(
     return RobotRun(bound, trajectory, tolerance, settings)
 
 
-def driven(robot: Robot, asked: Trot) -> Walker | CpgDriven:
+def driven(robot: Robot, asked: Trot) -> Driven:
     """The drive that is asked for. Raises `ParameterError` and `UnknownNameError`."""
     if asked.controller not in CONTROLLERS:
         raise UnknownNameError("controller", asked.controller, CONTROLLERS)
@@ -121,16 +126,16 @@ def driven(robot: Robot, asked: Trot) -> Walker | CpgDriven:
             f"torques are limited to {asked.limit:g} N m, but not sampled",
             "limits work with a sample rate only; give one, such as 400 Hz",
         )
-    made: Walker | CpgDriven
+    made: Driven
     if asked.controller == OSCILLATORS:
         assert rate is not None
         springs, cpg = JointSprings(**gains), _oscillators(robot, asked.gait)
-        made = CpgDriven(robot, rate=rate, limit=limit, springs=springs, pattern=cpg)
+        made = CpgDriven(robot, rate=rate, limit=limit, law=springs, pattern=cpg)
     elif rate is not None:
         law = LAWS[asked.controller](**gains)
         made = Sampled(robot, gait=asked.gait, law=law, rate=rate, limit=limit)
     elif asked.controller == JointSprings.name:
-        made = SpringDriven(robot, asked.gait, springs=JointSprings(**gains))
+        made = SpringDriven(robot, asked.gait, law=JointSprings(**gains))
     else:
         made = ComputedTorque(robot, asked.gait, law=Tracking(**gains))
         if robot.linkage.size - len(robot.motors) < 4:

@@ -21,7 +21,7 @@ from flexspine.mechanics.rerooting import rerooted
 # Versions from the first up to the second: 4.0.0 gets accelerations wrong.
 VERSIONS = (3, 17), (4, 0)
 
-REMEDY = "pip install 'flexspine[engine]'"
+REMEDY = "pip install 'mujoco>=3.17,<4', or flexspine with the extra 'engine'"
 
 # kg m^2; MuJoCo takes no body without inertia, and this much is less than rounding errors.
 LEAST_INERTIA = 2e-15

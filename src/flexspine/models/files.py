@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,10 @@ if TYPE_CHECKING:
 
 def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     """Write everything, attributes included, as NetCDF-4."""
-    dataset.to_netcdf(path, engine="h5netcdf")
+    # In memory first: where a disk is full, HDF5 keeps the file open and crashes at the very end.
+    whole = BytesIO()
+    dataset.to_netcdf(whole, engine="h5netcdf")
+    path.write_bytes(whole.getbuffer())
 
 
 def write_csv(dataset: xr.Dataset, path: Path) -> None:

@@ -232,7 +232,7 @@ def _bounds(model: Model) -> dict[str, tuple[float, float, str]]:
     bounds |= {f"touchdown.{side}": angle for side in SIDES}
     for item in quantities(type(model.parameters)):
         low = np.nextafter(item.lower, np.inf) if item.lower_is_open else item.lower
-        told = f"give a number in {item.bounds} {item.unit} ({item.meaning})"
+        told = f"give a number in {item.told} ({item.meaning})"
         bounds[item.name] = (float(low), item.upper, told)
     return bounds
 

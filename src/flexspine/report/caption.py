@@ -73,7 +73,8 @@ def _mean_speed(dataset: xr.Dataset) -> list[str]:
     if not duration > 0:
         return []
     x = dataset["com"][:, 0] if is_robot(dataset) else dataset["com_x"]
-    return [f"mean speed {float(x[-1] - x[0]) / duration:#.3g} m/s"]
+    start = ", start included" if is_robot(dataset) else ""
+    return [f"mean speed {float(x[-1] - x[0]) / duration:#.3g} m/s{start}"]
 
 
 def _changed(dataset: xr.Dataset) -> list[str]:

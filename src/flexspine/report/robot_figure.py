@@ -217,7 +217,7 @@ def _draw_com(axes: Axes, dataset: xr.Dataset) -> None:
     _few_ticks(axes)
     twin = axes.twinx()
     (ahead,) = twin.plot(time, x - steady(time, x), color=GREEN, linestyle="--", label="ahead")
-    twin.set_ylabel("ahead (m)", color=GREEN)
+    twin.set_ylabel("ahead (m)", color=GREEN, labelpad=8)
     twin.tick_params(axis="y", colors=GREEN)
     twin.spines["right"].set_visible(True)
     widen(twin, 0.01)
