@@ -220,11 +220,11 @@ class _Run:
         crossed = guard.name in self.section.guards and self._may_cross()
         if not (crossed or jump.acts):
             return False
-        if guard.decide is not None:
+        if guard.decide is not None and not crossed:
             return self._decide(guard, guard.decide)
         self.instant, self.fired = self.time, [guard.name]
         before = self.mode
-        if jump.acts:
+        if guard.jumps or guard.ends is not None:
             values = mode.evaluate(self.states, self.held)
             if guard.ends is None and self._in_doubt(guard, values[jump.rate]):
                 return True
@@ -382,6 +382,13 @@ class _Run:
         for symbol, value in self.section.resets.items():
             self.held[self.bound.system.places[symbol]] = value
         self.crossings.append(self._here())
+        if self.section.act is not None:
+            found = self.section.act(self.bound, self._here())
+            if isinstance(found, Outcome):
+                self.outcome = found
+                return
+            if found is not None:
+                _, self.mode, self.states, self.held = found
         self.steps_left, self.limit = self.max_steps, self._limit()
         if len(self.crossings) == self.wanted:
             self.outcome = Outcome(COMPLETED, f"{self.wanted} x {self._section_name}")

@@ -85,7 +85,7 @@ class Section:
     ``coordinates`` name the states that identify a point of it, ``missed`` is the outcome of a
     run that never comes back to it. ``quantities`` are further functions of a point of it, such
     as its energy, in the definitions of ``mode``; ``conserved`` names those of them that no orbit
-    changes.
+    changes. ``act`` is what a controller does on the section, after the resets.
     """
 
     guards: tuple[str, ...]
@@ -96,6 +96,7 @@ class Section:
     mode: str = ""
     quantities: Mapping[str, sp.Expr] = default(default_factory=dict)
     conserved: tuple[str, ...] = ()
+    act: Decision | None = None
 
 
 @dataclass(frozen=True)

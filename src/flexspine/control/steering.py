@@ -1,0 +1,196 @@
+"""Bounders that are steered: once or twice a stride, at apexes, some of their parameters change.
+
+What is steered (touchdown angles, thrust) becomes a held variable of the hybrid system, so that a
+run of a thousand strides is one run, with exact events, recorded like any other.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+import sympy as sp
+
+from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.gaits.return_map import section_rows
+from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.integrate import integrate
+from flexspine.hybrid.outcome import Outcome
+from flexspine.hybrid.system import HybridSystem, Mode
+from flexspine.hybrid.trajectory import HybridState
+from flexspine.models.bounder import STOOD
+from flexspine.models.model import TOLERANCES, Model, check_between
+from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count
+
+# What no touchdown angle is steered beyond, in rad from the vertical.
+STEEPEST = 1.4
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What measuring and acting are off by, drawn anew at every apex.
+
+    ``sensing`` is Gaussian, in the natural units of the apex coordinates. ``acting`` is relative to
+    what was to be done: its half-width if ``uniform``, its standard deviation otherwise.
+    """
+
+    sensing: float = 0.0
+    acting: float = 0.0
+    uniform: bool = False
+
+
+class Steering(ABC):
+    """What a controller does at apexes. ``inputs`` are the parameters it sets, by dotted name."""
+
+    inputs: tuple[str, ...]
+
+    @abstractmethod
+    def at_apex(self, apex: Array) -> Array:
+        """The inputs (u,) for section coordinates (d,) at an apex after both stances."""
+
+    def between(self, apex: Array, before: Array) -> Array:
+        """The inputs at an apex between the stances; ``before`` are those at work now."""
+        return before
+
+
+@dataclass(frozen=True)
+class Fixed(Steering):
+    """Inputs that never change."""
+
+    inputs: tuple[str, ...]
+    values: Array
+
+    def at_apex(self, apex: Array) -> Array:
+        """The same as ever."""
+        return self.values
+
+
+@lru_cache(maxsize=64)
+def steered_system(system: HybridSystem, inputs: tuple[sp.Symbol, ...]) -> HybridSystem:
+    """The same system, in which some parameters are set at every apex."""
+    built: dict[str, Mode] = {}
+
+    def mode(name: str) -> Mode:
+        if name not in built:
+            found = system.mode(name)
+            guards = tuple(
+                replace(guard, decide=_between) if guard.name in system.section.guards else guard
+                for guard in found.guards
+            )
+            built[name] = replace(found, guards=guards)
+        return built[name]
+
+    return replace(
+        system,
+        held=(*system.held, *inputs),
+        parameters=tuple(p for p in system.parameters if p not in inputs),
+        mode=mode,
+        section=replace(system.section, act=_at_apex),
+        reversal=None,
+    )
+
+
+class SteeredBounder(BoundSystem):
+    """A steered system with its numbers. Raises `UnknownNameError` for inputs it does not have."""
+
+    def __init__(
+        self, model: Model, steering: Steering, tolerance: float, noise: Noise, seed: int
+    ) -> None:
+        names = model.parameter_names
+        for name in steering.inputs:
+            if name not in names:
+                raise UnknownNameError("parameter", name, names)
+        model = model.keeping(steering.inputs)
+        symbols = tuple(model.system.parameters[names.index(name)] for name in steering.inputs)
+        system = steered_system(model.system, symbols)
+        own = dict(zip(model.system.parameters, model.parameter_vector.tolist(), strict=True))
+        numbers = np.array([own[symbol] for symbol in system.parameters])
+        super().__init__(compile_system(system, tolerance), numbers)
+        self.model, self.steering, self.noise = model, steering, noise
+        self._random = np.random.default_rng(seed)
+        self._rows = section_rows(system)
+        self._inputs = [system.places[symbol] for symbol in symbols]
+        self._angles = np.array([name.startswith("touchdown.") for name in steering.inputs])
+        self._stood = [system.places[flag] for flag in STOOD]
+        self._scales = np.array([model.scales[name] for name in system.section.coordinates])
+
+    def start(self) -> HybridState:
+        """The model's apex, steered."""
+        apex = self.model.apex_state()
+        held = np.zeros(len(self.system.held))
+        held[: len(apex.held)] = apex.held
+        return self.steer(HybridState(apex.time, apex.mode, apex.states, held), between=False)
+
+    def steer(self, point: HybridState, *, between: bool) -> HybridState:
+        """Set the inputs at an apex."""
+        apex = point.states[self._rows]
+        if self.noise.sensing:
+            off = self._random.standard_normal(len(apex))
+            apex = apex + self.noise.sensing * off * self._scales
+        before = point.held[self._inputs]
+        wanted = self.steering.between(apex, before) if between else self.steering.at_apex(apex)
+        held = point.held.copy()
+        held[self._inputs] = self._done(wanted, before) if between else self._done(wanted)
+        return point._replace(held=held)
+
+    def _done(self, wanted: Array, before: Array | None = None) -> Array:
+        """What becomes of what is wanted. What stays as it was is not drawn anew."""
+        done = wanted.copy()
+        if self.noise.acting:
+            size = len(wanted)
+            draw = self._random.uniform(-1, 1, size) if self.noise.uniform else None
+            off = self._random.standard_normal(size) if draw is None else draw
+            done = wanted * (1 + self.noise.acting * off)
+        done = np.where(self._angles, np.clip(done, -STEEPEST, STEEPEST), done)
+        return done if before is None else np.where(wanted == before, before, done)
+
+    def alone(self, point: HybridState) -> bool:
+        """Whether one leg only has stood since the latest apex after both."""
+        return bool(point.held[self._stood].sum() == 1)
+
+
+def _at_apex(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:
+    assert isinstance(bound, SteeredBounder)
+    return bound.steer(point, between=False)
+
+
+def _between(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:
+    assert isinstance(bound, SteeredBounder)
+    return bound.steer(point, between=True) if bound.alone(point) else None
+
+
+@dataclass(frozen=True)
+class SteeredRun(Run):
+    """A run that was steered."""
+
+    steering: Steering = field(kw_only=True)
+    noise: Noise = field(kw_only=True)
+    seed: int = field(kw_only=True)
+
+
+def steer(
+    model: Model,
+    steering: Steering,
+    *,
+    strides: int = 1,
+    noise: Noise | None = None,
+    seed: int = 0,
+    tolerance: float = DEFAULT_TOLERANCE,
+    record: bool = False,
+) -> SteeredRun:
+    """Simulate ``strides`` strides from the model's apex under a controller.
+
+    Without ``record`` only the apexes are kept, not the motion between them. The same seed repeats
+    the same noise. A run that falls is no error: look at ``outcome``. Raises `ParameterError` and
+    `UnknownNameError`.
+    """
+    wanted = check_count("strides", strides)
+    if not (isinstance(seed, int) and seed >= 0):
+        raise ParameterError(f"seed = {seed} is not usable", "give a whole number from 0 on")
+    noise = noise or Noise()
+    tolerance = check_between("tolerance", tolerance, *TOLERANCES)
+    bound = SteeredBounder(model, steering, tolerance, noise, seed)
+    trajectory = integrate(bound, bound.start(), crossings=wanted, record=record)
+    return SteeredRun(bound.model, trajectory, tolerance, steering=steering, noise=noise, seed=seed)
