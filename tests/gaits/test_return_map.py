@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flexspine import Model, load_model
+from flexspine import Model, load_model, stride_map
 from flexspine.gaits.return_map import ReturnMap, linearize
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.trajectory import Trajectory
+from flexspine.models.actuation import ACTUATORS, STRIDE_PHASES
 from flexspine.models.simulation import DEFAULT_TOLERANCE
 from flexspine.parameters import values
 from tests import second_implementation as reference
@@ -66,7 +67,7 @@ def derivative(model: Model, parameters: list[str]) -> ReturnMap:
 def scale(model: Model, name: str) -> float:
     """A natural size of a coordinate, an angle or a parameter."""
     given = values(model.parameters)
-    if name in given and name != "spine.rest_angle":
+    if name in given and name not in ("spine.rest_angle", *ACTUATORS):
         return given[name]
     by_name = {"height": 0.36, "speed": 5.0}
     return by_name.get(name, 10.0 if name.endswith("_rate") else 1.0)
@@ -102,8 +103,16 @@ def test_the_derivative_by_every_coordinate_angle_and_parameter_is_that_of_plain
 ) -> None:
     """Masses, inertias, lengths, stiffnesses, dampers, rest angle, gravity, touchdown angles."""
     model, _ = make(np.random.default_rng(seed), damped)
-    # Without dampers their terms are left out, and so no derivative by them exists.
-    parameters = [n for n in model.parameter_names if damped or not n.endswith("damping")]
+    assert_derivative_is_that_of_plain_runs(model, there(model, damped))
+
+
+def there(model: Model, damped: bool) -> list[str]:
+    """Parameters whose terms are in the equations; without those no derivative by them exists."""
+    passive = [name for name in model.parameter_names if name not in ACTUATORS]
+    return [name for name in passive if damped or not name.endswith("damping")]
+
+
+def assert_derivative_is_that_of_plain_runs(model: Model, parameters: list[str]) -> None:
     exact = derivative(model, parameters)
     assert exact.trajectory.outcome.completed
     names = [*model.apex, *parameters]
@@ -111,6 +120,39 @@ def test_the_derivative_by_every_coordinate_angle_and_parameter_is_that_of_plain
     found = np.vstack([exact.states, exact.time]) * scales
     expected = np.column_stack([difference(model, name) for name in names]) * scales
     np.testing.assert_allclose(found, expected, rtol=0, atol=AGREEMENT * np.abs(expected).max())
+
+
+ACTUATION = {
+    "legs.stiffening": 0.05, "legs.extension": 0.01, "legs.hip_lever": 0.01,
+    "fore.leg.stiffening": 0.1, "fore.leg.extension": -0.005, "fore.leg.hip_lever": 0.005,
+    "hind.leg.stiffening": -0.1, "hind.leg.extension": 0.01, "hind.leg.hip_lever": -0.005,
+    **{f"spine.stiffness_shift.{p}": 0.1 * (i - 2.5) for i, p in enumerate(STRIDE_PHASES)},
+    **{f"spine.rest_shift.{p}": 0.02 * (i - 1.5) for i, p in enumerate(STRIDE_PHASES)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("damped", "seed"), [(False, 9), (True, 1)])
+def test_the_derivative_by_every_actuator_is_that_of_plain_runs(damped: bool, seed: int) -> None:
+    """Forces and the spine's torque jump at events; works are states like others."""
+    model, _ = flexible(np.random.default_rng(seed), damped)
+    model = model.with_values(ACTUATION)
+    assert_derivative_is_that_of_plain_runs(model, list(ACTUATION))
+
+
+def test_what_is_not_there_yet_has_a_derivative_too() -> None:
+    """Of the next apex by actuators that are at rest, whose terms plain runs leave out."""
+    model, _ = flexible(np.random.default_rng(2), False)
+    exact = stride_map(model, parameters=list(ACTUATION))
+    rows = [model.system.states.index(s) for s in model.system.section.coordinates.values()]
+    for name, found in zip(ACTUATION, exact.by_parameters.T, strict=True):
+        ends = [
+            stride(moved(model, name, steps * STEP)).end.states[rows]
+            for steps in (-4, -3, -2, -1, 1, 2, 3, 4)
+        ]
+        expected = np.array([*(-w for w in WEIGHTS[::-1]), *WEIGHTS]) @ np.array(ends) / STEP
+        np.testing.assert_allclose(
+            found, expected, rtol=0, atol=1e-9 * max(np.abs(expected).max(), 0.1)
+        )
 
 
 def test_the_random_strides_visit_every_phase_and_every_order_of_legs() -> None:
@@ -133,7 +175,7 @@ def test_damped_strides_have_the_derivative_of_the_second_implementation(
     By touchdown angles, and where the other program is fast by the state too.
     """
     model, body = make(np.random.default_rng(seed), True)
-    exact = derivative(model, list(model.parameter_names))
+    exact = derivative(model, there(model, damped=True))
     apex, touchdown = dict(model.apex), dict(model.touchdown)
     pairs = [(exact.by_parameters[:, -2:], True)]
     if make is rigid:
@@ -170,7 +212,7 @@ DAMPERS = {"fore.leg.damping": 8.0, "hind.leg.damping": 5.0, "spine.damping": 0.
 def test_two_strides_have_the_product_of_their_derivatives(dampers: dict[str, float]) -> None:
     """Chain rule; the time of both is that of the first and of the second from its image."""
     model = load_model("kamimura2015-flexible", dampers, apex={"speed": 4.6})
-    names = [n for n in model.parameter_names if dampers or not n.endswith("damping")]
+    names = there(model, bool(dampers))
     first = derivative(model, names)
     apex = dict(zip(model.apex, first.image.tolist(), strict=True))
     second = derivative(model.with_values(apex=apex), names)

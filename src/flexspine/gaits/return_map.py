@@ -95,6 +95,7 @@ def stride_map(
     for name in parameters:
         if name not in names:
             raise UnknownNameError("parameter", name, names)
+    model = model.keeping(parameters)
     trajectory = integrate(model.bind(tolerance), model.apex_state(), crossings=strides)
     if not trajectory.outcome.completed:
         raise ParameterError(
