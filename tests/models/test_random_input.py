@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from flexspine import load_model, simulate
 from flexspine.errors import InputError
+from flexspine.models.actuation import ACTUATORS
 from flexspine.parameters import quantities
 
 OUTCOMES = {"completed", "fell", "no_apex", "grazed", "chattered", "timed_out", "diverged"}
@@ -98,11 +99,24 @@ def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) 
         st.integers(-3, 3),
         st.sampled_from([1e-300, 1e300, 1e9, 1e-9, "text", None, True]),
     )
-    names = [about.name for about in quantities(type(model.parameters))]
+    about = quantities(type(model.parameters))
+    names = [each.name for each in about if each.name not in ACTUATORS]
     changes = data.draw(st.dictionaries(st.sampled_from(names), number, max_size=3))
     apex = data.draw(st.dictionaries(st.sampled_from(list(model.apex)), st.floats(), max_size=3))
     angles = data.draw(st.dictionaries(st.sampled_from(("fore", "hind")), st.floats(), max_size=2))
     check(model.name, changes, apex, angles)
+
+
+@settings(max_examples=300)
+@given(sane(), st.data())
+def test_actuated_bounders_end_in_an_outcome_or_one_error(
+    case: tuple[str, dict[str, Any], dict[str, float], dict[str, float]], data: st.DataObject
+) -> None:
+    """Small numbers and absurd ones; all actuators at once, as each set of them is compiled."""
+    preset, changes, apex, touchdown = case
+    names = [name for name in ACTUATORS if preset == PRESETS[0] or not name.startswith("spine.")]
+    number = st.one_of(within(-0.2, 0.2), st.sampled_from([-20.0, -0.99, 3.0, 50.0])).filter(bool)
+    check(preset, {**changes, **{n: data.draw(number) for n in names}}, apex, touchdown)
 
 
 @settings(max_examples=300)
