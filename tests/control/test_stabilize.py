@@ -159,5 +159,5 @@ def test_what_cannot_be_designed_is_refused(case: str) -> None:
 @pytest.mark.parametrize("method", ["lqr", "deadbeat"])
 def test_inputs_that_reach_nothing_are_refused(method: str) -> None:
     """The gait never has both legs on the ground, so a spine that changes then changes nothing."""
-    with pytest.raises(FlexspineError, match="legs.extension"):
+    with pytest.raises(FlexspineError, match=r"legs\.extension"):
         stabilize(gait(), ("spine.rest_shift.both",), method=method)

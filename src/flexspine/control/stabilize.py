@@ -148,7 +148,16 @@ def stabilize(
         raise ParameterError("deadbeat feedback acts once a stride", "take lqr to act twice")
     parts = _parts(gait, inputs, twice)
     gains = _lqr(parts, effort) if method == "lqr" else (_deadbeat(parts[0]),)
-    return Stabilizer(gait, inputs, method, parts, gains)
+    found = Stabilizer(gait, inputs, method, parts, gains)
+    if not found.level_spectral_radius < 1:
+        raise _unstable()
+    return found
+
+
+def _unstable() -> FlexspineError:
+    return FlexspineError(
+        "no feedback to these inputs makes the gait stable", "steer more, such as legs.extension"
+    )
 
 
 def _scales(model: Model, inputs: tuple[str, ...]) -> tuple[Array, Array]:
@@ -232,9 +241,7 @@ def _lqr(parts: tuple[Part, ...], effort: float) -> tuple[Array, ...]:
             break
         if change < SETTLED * max(1.0, *(float(np.abs(gain).max()) for gain in gains)):
             return tuple(gain @ part.level for gain, part in zip(gains, parts, strict=True))
-    raise FlexspineError(
-        "no feedback of these inputs makes the gait stable", "steer more, such as legs.extension"
-    )
+    raise _unstable()
 
 
 def _deadbeat(part: Part) -> Array:
