@@ -128,10 +128,13 @@ class Tracer:
         """Land on the bound that was overstepped."""
         here = tracing.points[-1]
         bound = self.low if beyond.value < self.low else self.high
+        end = f"reached {self.family.over} = {bound:g}"
+        if here.value == bound:
+            return replace(tracing, end=end)
         edge = land(self.family, Segment(self.family, here, beyond), bound)
         if edge is None:
             return self._shorter(tracing, "the bound could not be reached")
-        return _extended(tracing, self.family, edge)
+        return _extended(tracing, self.family, edge, end=end)
 
     def _shorter(self, tracing: Tracing, reason: str) -> Tracing:
         """Try again with half the step, or give up and say why."""
