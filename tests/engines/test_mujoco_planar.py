@@ -158,7 +158,7 @@ def test_a_run_can_be_done_again() -> None:
 
 def test_a_missing_mujoco_is_told_with_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(MachineError, match=r"'mujoco' is not installed; pip install 'flexspine\["):
+    with pytest.raises(MachineError, match=r"'mujoco' is not installed; pip install 'mujoco>"):
         PinnedMujoco(uneven(), "f")
 
 

@@ -6,6 +6,7 @@ import sympy as sp
 
 from flexspine.mechanics.equations import as_latex, as_text, written_out
 from flexspine.mechanics.lagrangian import AppliedForce, Lagrangian
+from flexspine.models.actuation import BARE, DAMPED
 from flexspine.models.bounder import lagrangian, stance_legs
 from flexspine.models.flexible_bounder import FLEXIBLE_BOUNDER
 
@@ -54,7 +55,7 @@ def test_dampers_and_forces_do_virtual_work() -> None:
 
 def test_the_flexible_body_is_diagonal_in_mean_and_half_bend() -> None:
     """T = m_s v^2 + (J + m_s a^2 cos^2 p) t'^2 + (J + m_s a^2 sin^2 p) p'^2 for equal halves."""
-    body = FLEXIBLE_BOUNDER.body(False)
+    body = FLEXIBLE_BOUNDER.body(BARE)
     system = lagrangian(body)
     m, J, a, t, p, vt, vp = sp.symbols("m_s J a t p vt vp", real=True)
     letters = {str(s): s for s in system.kinetic.free_symbols | set(body.parameters.values())}
@@ -76,8 +77,8 @@ def test_the_flexible_body_is_diagonal_in_mean_and_half_bend() -> None:
 
 
 def test_equations_are_written_as_text_and_latex() -> None:
-    body = FLEXIBLE_BOUNDER.body(True)
-    lines = written_out(lagrangian(body, stance_legs(body, "DS", damped=True)))
+    body = FLEXIBLE_BOUNDER.body(DAMPED)
+    lines = written_out(lagrangian(body, "DS", stance_legs(body, "DS", DAMPED)))
     text, latex = as_text(lines, unicode=False), as_latex(lines)
     assert "Equations of motion" in text
     assert r"\ddot{\theta}_{f}" in latex
