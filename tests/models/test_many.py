@@ -113,3 +113,15 @@ def test_the_tally_counts_every_run() -> None:
     many = simulate_many(model, scattered(model), strides=2)
     assert sum(many.tally.values()) == len(many) == RUNS
     assert simulate(many.cases.one(3), strides=2).outcome.name == many["outcome"][3]
+
+
+def test_actuators_that_some_runs_have_act_in_these_alone(flexible: Model) -> None:
+    """Below zero in one run and absent in the other, whose equations are then those of both."""
+    given = {"legs.extension": [-0.003, 0.0], "spine.stiffness_shift.fore": [-0.1, 0.0]}
+    runs = simulate_many(flexible, parameters=given)
+    for number in range(2):
+        alone = runs.run(number)
+        assert runs["outcome"][number] == alone.outcome.name
+        for name, value in alone.apexes[-1].items():
+            assert runs[f"apex_{name}"][number] == pytest.approx(value, abs=1e-9)
+    assert runs["energy_end"][0] != pytest.approx(runs["energy_end"][1], abs=0.1)

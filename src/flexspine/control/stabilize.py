@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from flexspine.control.steering import Steering
 from flexspine.errors import FlexspineError, ParameterError, UnknownNameError
 from flexspine.gaits.gait import Gait
+from flexspine.gaits.problem import ANGLES
 from flexspine.gaits.return_map import linearize, section_rows
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
@@ -24,10 +25,7 @@ from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.system import Section
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import STOOD
-from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
-
-ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
 
 METHODS = ("lqr", "deadbeat")
 

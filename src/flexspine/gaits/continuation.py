@@ -145,9 +145,8 @@ def family_of(
         name: value for name, value in (own if fixed is None else fixed).items() if name != over
     }
     unknown = (*(() if over in known else (over,)), *free)
-    mirrored = gait.symmetric if symmetric is None else symmetric
-    if symmetric is None and not gait.model.keeping(unknown).features.reversible:
-        mirrored = False
+    reversible = gait.model.keeping(unknown).features.reversible
+    mirrored = gait.symmetric and reversible if symmetric is None else symmetric
     problem = Problem(
         gait.model,
         kept,

@@ -89,6 +89,8 @@ def summarize(run: Run, profile: Profile | None = None) -> Summary:
         froude = (length / period) ** 2 / (given["gravity"] * leg)
         duty = {side: _stance_time(run, side, *stride) / period for side in SIDES}
     profile = profile or Profile(run)
+    work, weight = _work(run, profile), run.model.mass * given["gravity"]
+    given_by_all = sum(each.positive for each in work.values())
     spine = None
     if "spine.stiffness" in given and trajectory.arcs:
         low, high = profile.range("spine_angle")
@@ -105,11 +107,8 @@ def summarize(run: Run, profile: Profile | None = None) -> Summary:
         peak_grf_vertical={side: profile.range(f"{side}_grf_y")[1] for side in SIDES},
         spine_range=spine,
         energy=_energy(run),
-        work=(work := _work(run, profile)),
-        cost_of_transport=sum(each.positive for each in work.values())
-        / (run.model.mass * given["gravity"] * abs(moved))
-        if moved
-        else None,
+        work=work,
+        cost_of_transport=given_by_all / (weight * abs(moved)) if moved else None,
     )
 
 
@@ -203,10 +202,15 @@ def _turning_values(samples: Array) -> Array:
     steps = np.diff(samples)
     if not (steps.min() < 0 < steps.max()):
         return ends
-    series = _INTERPOLATE @ samples
+    between = _turns(_INTERPOLATE @ samples)
+    return np.concatenate([ends[:1], between, ends[1:]])
+
+
+def _turns(series: Array) -> Array:
+    """The values of a Chebyshev series where it turns round, in order."""
     turns = chebyshev.chebroots(chebyshev.chebder(series))
-    inside = np.sort(turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)])
-    return np.concatenate([ends[:1], chebyshev.chebval(inside, series), ends[1:]])
+    inside = turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)]
+    return np.asarray(chebyshev.chebval(np.sort(inside), series), dtype=float)
 
 
 def _polished(samples: Array, sign: float) -> float:
@@ -219,9 +223,7 @@ def _polished(samples: Array, sign: float) -> float:
         outward = -1.0 if top == 0 else 1.0
         if outward * (_SLOPES * outward ** (_POWERS + 1)) @ series >= 0:
             return largest
-    turns = chebyshev.chebroots(chebyshev.chebder(series))
-    inside = turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)]
-    return float(max([*chebyshev.chebval(inside, series), largest]))
+    return float(max([*_turns(series), largest]))
 
 
 def _energy(run: Run) -> dict[str, float | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -217,9 +217,13 @@ def make_cases(model: Model, given: Mapping[str, ArrayLike], body: Model | None 
 
 
 def _with_largest(model: Model, varied: Mapping[str, Array]) -> Model:
-    """A model with every parameter as large as it gets; terms that vanish leave the system."""
+    """A model with every parameter as far from zero as it gets; terms that vanish leave it."""
     known = values(model.parameters)
-    largest = {name: float(column.max()) for name, column in varied.items() if name in known}
+    largest = {
+        name: float(column[np.argmax(np.abs(column))])
+        for name, column in varied.items()
+        if name in known
+    }
     return model.with_values(largest) if largest else model
 
 
@@ -257,7 +261,8 @@ def run_cases(cases: Cases, strides: int, tolerance: float) -> Columns:
 
 def _starts(cases: Cases) -> tuple[Model, Starts]:
     """The model whose system serves all cases, and where they start."""
-    model, count, start = cases.body, len(cases), cases.model.apex_state()
+    model, count = cases.body, len(cases)
+    start = replace(cases.model, kept=model.features).apex_state()
     states = np.repeat(start.states[:, None], count, axis=1)
     parameters = np.repeat(cases.model.parameter_vector[:, None], count, axis=1)
     coordinates, names = model.system.section.coordinates, model.parameter_names

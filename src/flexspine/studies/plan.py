@@ -104,11 +104,11 @@ class Plan:
         return self.chunks_each * len(self.models)
 
     def body(self, model: Model) -> Model:
-        """A model with every parameter as large as the axes make it; see `make_cases`."""
+        """A model with every parameter as far from zero as the axes make it; see `make_cases`."""
         known = values(model.parameters)
         own = {axis.name: known[axis.name] for axis in self.axes if axis.name in known}
         return model.with_values(
-            {a.name: a.range(own[a.name])[1] for a in self.axes if a.name in own}
+            {a.name: max(a.range(own[a.name]), key=abs) for a in self.axes if a.name in own}
         )
 
     @property
