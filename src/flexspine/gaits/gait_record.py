@@ -42,6 +42,8 @@ def gait_record(gait: Gait, stability: Stability | None = None) -> dict[str, Any
         "peak_grf_vertical": summary.peak_grf_vertical,
         "duty_factor": summary.duty_factor or dict.fromkeys(SIDES),
         "com_amplitude": gait.com_amplitude,
+        "work": {name: each._asdict() for name, each in summary.work.items()},
+        "cost_of_transport": summary.cost_of_transport,
         "energy_shares": {"apex": gait.apex_energy_shares, "mean": gait.mean_energy_shares},
         "floquet_multipliers": [[value.real, value.imag] for value in stability.multipliers],
         "spectral_radius": stability.spectral_radius,

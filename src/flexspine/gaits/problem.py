@@ -89,7 +89,7 @@ class Problem:
         spanned = self._spanned()
         self.unknowns = tuple(name for name in (*spanned, *ANGLES, *free) if name not in self.fixed)
         self._quantities = [name for name in ("energy", "mean_speed") if name in self.fixed]
-        self._scale_of = {**model.scales, **dict.fromkeys(free, 1.0)}
+        self._scale_of = {**dict.fromkeys(free, 1.0), **model.scales}
         self.scales = np.array([self._scale_of[name] for name in self.unknowns])
         given = values(model.parameters)
         self._logarithmic = {name: given[name] for name in free if given[name] > 0}

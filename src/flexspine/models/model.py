@@ -14,7 +14,7 @@ from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.compile import Array, BoundSystem, compile_system
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
-from flexspine.models.actuation import BARE, Features
+from flexspine.models.actuation import ACTUATORS, BARE, HIP_LEVER, Features
 from flexspine.models.bounder import FORE, HIND, BounderKind, works
 from flexspine.models.legs import SIDES, phase_of
 from flexspine.parameters import ParameterSet, is_number, replaced, shortened, values
@@ -163,7 +163,7 @@ class Model:
 
     @cached_property
     def scales(self) -> dict[str, float]:
-        """Natural scales: of section coordinates, touchdown angles, energy and mean speed.
+        """Natural scales: of section coordinates, touchdown angles, actuators, energy, mean speed.
 
         Built from weight, leg length and gravity, so that figures in them know no units.
         """
@@ -175,7 +175,11 @@ class Model:
         scales["energy"] = self.mass * gravity * length
         for name in self.system.section.coordinates:
             scales.setdefault(name, rate if name.endswith("_rate") else 1.0)
-        return scales | {f"touchdown.{side}": 1.0 for side in SIDES}
+        scales |= {f"touchdown.{side}": 1.0 for side in SIDES}
+        return scales | {
+            name: length if name.endswith((".extension", f".{HIP_LEVER}")) else 1.0
+            for name in ACTUATORS
+        }
 
     @cached_property
     def parameter_vector(self) -> Array:
