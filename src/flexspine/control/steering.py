@@ -23,6 +23,7 @@ from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import STOOD
 from flexspine.models.model import TOLERANCES, Model, check_between
 from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count
+from flexspine.models.underfoot import TOES, OnGround, lose
 
 # What no touchdown angle is steered beyond, in rad from the vertical.
 STEEPEST = 1.4
@@ -48,7 +49,10 @@ class Steering(ABC):
 
     @abstractmethod
     def at_apex(self, apex: Array) -> Array:
-        """The inputs (u,) for section coordinates (d,) at an apex after both stances."""
+        """The inputs (u,) for section coordinates (d,) at an apex after both stances.
+
+        Where the ground is not flat the height is that above the ground below the CoM.
+        """
 
     def between(self, apex: Array, before: Array) -> Array:
         """The inputs at an apex between the stances; ``before`` are those at work now."""
@@ -92,7 +96,7 @@ def steered_system(system: HybridSystem, inputs: tuple[sp.Symbol, ...]) -> Hybri
     )
 
 
-class SteeredBounder(BoundSystem):
+class SteeredBounder(OnGround):
     """A steered system with its numbers. Raises `UnknownNameError` for inputs it does not have."""
 
     def __init__(
@@ -107,10 +111,11 @@ class SteeredBounder(BoundSystem):
         system = steered_system(model.system, symbols)
         own = dict(zip(model.system.parameters, model.parameter_vector.tolist(), strict=True))
         numbers = np.array([own[symbol] for symbol in system.parameters])
-        super().__init__(compile_system(system, tolerance), numbers)
+        super().__init__(compile_system(system, tolerance), numbers, model.ground)
         self.model, self.steering, self.noise = model, steering, noise
         self._random = np.random.default_rng(seed)
         self._rows = section_rows(system)
+        self._height = list(system.section.coordinates).index("height")
         self._inputs = [system.places[symbol] for symbol in symbols]
         self._angles = np.array([name.startswith("touchdown.") for name in steering.inputs])
         self._stood = [system.places[flag] for flag in STOOD]
@@ -125,7 +130,10 @@ class SteeredBounder(BoundSystem):
 
     def steer(self, point: HybridState, *, between: bool) -> HybridState:
         """Set the inputs at an apex."""
+        x = float(point.states[0])
         apex = point.states[self._rows]
+        if self.ground is not None:
+            apex[self._height] -= self.ground.height(x)
         if self.noise.sensing:
             off = self._random.standard_normal(len(apex))
             apex = apex + self.noise.sensing * off * self._scales
@@ -133,6 +141,8 @@ class SteeredBounder(BoundSystem):
         wanted = self.steering.between(apex, before) if between else self.steering.at_apex(apex)
         held = point.held.copy()
         held[self._inputs] = self._done(wanted, before) if between else self._done(wanted)
+        if self.ground is not None:
+            lose(held, self.system.places, x, TOES.values())
         return point._replace(held=held)
 
     def _done(self, wanted: Array, before: Array | None = None) -> Array:

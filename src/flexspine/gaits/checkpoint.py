@@ -1,23 +1,18 @@
-"""A branch on disk while it is being traced: one line a step, so that none is ever lost.
-
-The file is made of JSON lines. The first describes what is traced; each further one adds what a
-step has found. A last line that was cut off by a crash is dropped.
-"""
+"""A branch on disk while it is being traced: one line a step, so that none is ever lost."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flexspine.errors import OUT_OF_SPACE, OutputError
 from flexspine.gaits.family import BranchPoint, Family
 from flexspine.gaits.landmarks import Landmark
 from flexspine.gaits.newton import Attempt
 from flexspine.gaits.tracing import Tracing
+from flexspine.workers.journal import Journal
 
 KEYS = {"way", "points", "count", "marks", "step", "end"}
 
@@ -26,36 +21,7 @@ class Checkpoint:
     """The file of one branch; opening it reads what is there. Raises `OutputError`."""
 
     def __init__(self, path: Path, description: Mapping[str, Any]) -> None:
-        self.path = path
-        self._lines: list[dict[str, Any]] = []
-        header = json.loads(json.dumps(description))
-        try:
-            if path.exists():
-                self._read(header)
-            else:
-                path.write_text(json.dumps(header) + "\n", encoding="utf-8")
-        except OSError as failure:
-            if failure.errno in OUT_OF_SPACE:
-                raise
-            raise OutputError(
-                f"cannot use '{path}' ({failure.strerror})", "give another place"
-            ) from None
-
-    def _read(self, header: dict[str, Any]) -> None:
-        rest = ""
-        try:
-            whole, _, rest = self.path.read_text(encoding="utf-8").rpartition("\n")
-            first, *lines = [json.loads(line) for line in whole.splitlines()] or [None]
-        except ValueError:
-            first, lines = None, []
-        if first != header or not all(map(_is_step, lines)):
-            raise OutputError(
-                f"'{self.path}' is damaged, or holds a branch that was traced with other settings",
-                "give another place, or delete it to begin anew",
-            )
-        if rest:
-            self.path.write_text(whole + "\n", encoding="utf-8")
-        self._lines = lines
+        self._journal = Journal(path, description, "a branch that was traced", _is_step)
 
     def add(self, way: int, before: Tracing, after: Tracing) -> None:
         """Append what one step in direction ``way`` has found."""
@@ -72,14 +38,13 @@ class Checkpoint:
         }
         if not (line["points"] or line["marks"] or line["end"]):
             return  # a step that was only made shorter is found again as quickly
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
+        self._journal.add(line)
 
     def resume(self, way: int, family: Family, tracing: Tracing) -> Tracing:
         """Return how far the direction ``way`` has come."""
         points, marks = list(tracing.points), list(tracing.marks)
         step, end = tracing.step, tracing.end
-        for line in self._lines:
+        for line in self._journal.lines:
             if line["way"] != way:
                 continue
             points += [_revived(family, item) for item in line["points"]]

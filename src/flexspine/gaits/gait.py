@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,10 @@ class Gait:
     strides: int
     trajectory: Trajectory
     tolerance: float
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What goes to another process: how to run it anew."""
+        return _examined_anew, (self.model, self.strides, self.tolerance)
 
     @cached_property
     def run(self) -> Run:
@@ -235,11 +240,16 @@ def contact_times(trajectory: Trajectory) -> list[tuple[str, float]]:
     ]
 
 
+def _examined_anew(model: Model, strides: int, tolerance: float) -> Gait:
+    return examine(model, strides=strides, tolerance=tolerance)
+
+
 def examine(model: Model, *, strides: int = 1, tolerance: float = DEFAULT_TOLERANCE) -> Gait:
     """Run one period from the model's apex, and take it for a gait; its ``flaw`` tells if not.
 
     Raises `ParameterError` for a number of strides or a tolerance that is not usable.
     """
+    model.on_flat_ground("a gait")
     check_count("strides", strides)
     trajectory = integrate(model.bind(tolerance), model.apex_state(), crossings=strides)
     return Gait(model, strides, trajectory, tolerance)

@@ -103,6 +103,7 @@ class Problem:
 
     def _check(self) -> None:
         model, coordinates = self.model, self.system.section.coordinates
+        model.on_flat_ground("a gait")
         known = (*coordinates, *ANGLES, "energy", "mean_speed")
         for name, value in self.fixed.items():
             if name not in known:

@@ -90,6 +90,7 @@ def stride_map(
     apex coordinates in the order of ``model.apex`` and then these. SI and radians. Raises
     `UnknownNameError`, and `ParameterError` for a run that does not come back.
     """
+    model.on_flat_ground("the derivative of a stride")
     names = model.parameter_names
     check_count("strides", strides)
     for name in parameters:

@@ -250,20 +250,24 @@ class _Run:
             return True
         before = self.mode
         _, self.mode, self.states, self.held = found
-        self._note((guard.name,), before)
+        if not guard.quiet:
+            self._note((guard.name,), before)
         mode = self.bound.mode(self.mode)
         self._settle(mode, mode.evaluate(self.states, self.held))
         self._decide_more()
         return True
 
-    def _decide_more(self) -> None:
+    def _decide_more(self, *, by_level_only: bool = False) -> None:
         """Let decided guards fire that are due at this instant too."""
         while self.outcome is None:
             mode = self.bound.mode(self.mode)
-            if not mode.code.decided_here:
+            here = mode.code.decided_here
+            if by_level_only:
+                here = tuple(due for due in here if due.by_level)
+            if not here:
                 return
             values = mode.evaluate(self.states, self.held)
-            due = self._due(values[mode.code.guards], mode.code.decided_here)
+            due = self._due(values[mode.code.guards], here)
             if due is None:
                 return
             guard = mode.code.by_name[due].guard
@@ -336,6 +340,7 @@ class _Run:
                 self.outcome = Outcome(GRAZED, f"{jump.guard.name} at the start")
                 return
         self._settle(mode, values)
+        self._decide_more(by_level_only=True)
 
     def _settle(self, mode: BoundMode, values: Array) -> None:
         """Fire what is due at the start or the end, where no root is looked for."""

@@ -43,7 +43,7 @@ class Guard:
     these, ``decide`` may compute in numbers what happens. Such a guard may be ``costly``, its rate
     worth more than it is to know: then it is not looked for at the instant of another one.
     ``timed`` guards are clocks: however often they fire, and however slowly they are crossed,
-    nothing is wrong.
+    nothing is wrong. What happens at ``quiet`` ones is bookkeeping, no event to tell of.
     """
 
     name: str
@@ -55,6 +55,7 @@ class Guard:
     decide: Decision | None = None
     costly: bool = False
     timed: bool = False
+    quiet: bool = False
 
     @property
     def jumps(self) -> bool:

@@ -90,7 +90,7 @@ SPINE_WORK = sp.Symbol("W_s", real=True)
 class Features:
     """Which dampers and actuators there are; the terms of those that are not are left out.
 
-    ``switched``: the spine changes with the phase.
+    ``switched``: the spine changes with the phase; ``uneven``: the ground is not flat.
     """
 
     damped_legs: bool = False
@@ -98,6 +98,7 @@ class Features:
     thrust: bool = False
     hips: bool = False
     switched: bool = False
+    uneven: bool = False
 
     @classmethod
     def of(cls, given: Mapping[str, float]) -> Features:
@@ -126,7 +127,7 @@ class Features:
     @property
     def reversible(self) -> bool:
         """Whether a film of it, shown backwards, shows nothing impossible."""
-        return not (self.damped or self.thrust or self.hips)
+        return not (self.damped or self.thrust or self.hips or self.uneven)
 
     @property
     def conservative(self) -> bool:

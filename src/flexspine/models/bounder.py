@@ -28,6 +28,7 @@ from flexspine.models.legs import (
     hip_velocity,
     phase_of,
 )
+from flexspine.models.underfoot import TOES, WAVE_NUMBER, WAVES_FROM, Underfoot, clearance
 from flexspine.parameters import ParameterSet, quantity
 
 FELL = OutcomeKind(
@@ -62,10 +63,10 @@ class Body:
 
     ``coordinates`` maps public names of the angles to (angle, rate), in rad and rad/s;
     ``parameters`` maps dotted names to letters; hips and ``low_points`` are in the inertial
-    frame, the latter being what must stay above the ground besides the hips. ``pitches`` are angle
-    and rate of what carries each hip. ``power_lost`` is what the spine's damper takes, in W. Where
-    fore and hind ends are alike, looking at the body from its other side turns each angle into
-    minus that in ``mirror``.
+    frame, the latter being what must stay above the ground besides hips and CoM. ``pitches`` are
+    angle and rate of what carries each hip. ``power_lost`` is what the spine's damper takes, in W.
+    Where fore and hind ends are alike, looking at the body from its other side turns each angle
+    into minus that in ``mirror``.
     """
 
     coordinates: Mapping[str, tuple[sp.Symbol, sp.Symbol]]
@@ -79,7 +80,7 @@ class Body:
     spine: sp.Expr = sp.S.Zero
     switched: SwitchedSpine | None = None
     power_lost: sp.Expr = sp.S.Zero
-    low_points: Mapping[str, sp.Expr] = field(default_factory=dict)
+    low_points: Mapping[str, tuple[sp.Expr, sp.Expr]] = field(default_factory=dict)
     observables: Mapping[str, sp.Expr] = field(default_factory=dict)
 
 
@@ -161,6 +162,9 @@ def bounder_system(name: str, body: Body, features: Features) -> HybridSystem:
     held = [FORE.toe, HIND.toe, FORE.stanced, HIND.stanced, FORE.left, HIND.left]
     if features.thrust:
         held += [FORE.pushes, HIND.pushes]
+    if features.uneven:
+        held += [FORE.toe_height, HIND.toe_height, WAVES_FROM, WAVE_NUMBER]
+        held += [symbol for below in beneath(body) for symbol in below.held]
     return HybridSystem(
         name=name,
         states=states,
@@ -237,10 +241,23 @@ def works(features: Features) -> dict[str, sp.Symbol]:
     return found
 
 
+def beneath(body: Body) -> list[Underfoot]:
+    """What may meet ground that is not flat: toes and points of the body."""
+    return [*TOES.values(), *(Underfoot.of(name) for name in _low(body))]
+
+
+def _low(body: Body) -> dict[str, tuple[sp.Expr, sp.Expr]]:
+    """Points of the body that end the run on the ground."""
+    hips = {f"{side} hip": HIP[side] for side in HIP}
+    return {**hips, **body.low_points, "CoM": (X, Y)}
+
+
 def _mode(body: Body, phase: str, features: Features) -> Mode:
     stance = stance_legs(body, phase, features)
     standing = {leg.leg.side for leg in stance}
-    swing = [SwingLeg(leg, HIP[leg.side]) for leg in (FORE, HIND) if leg.side not in standing]
+    swing = [
+        SwingLeg(leg, HIP[leg.side], features) for leg in (FORE, HIND) if leg.side not in standing
+    ]
     mechanics = lagrangian(body, phase, stance)
     solving, accelerations = mechanics.accelerations()
     rates = dict(zip(mechanics.coordinates, mechanics.rates, strict=True))
@@ -259,15 +276,28 @@ def _mode(body: Body, phase: str, features: Features) -> Mode:
         guards.append(Guard("apex", Y_RATE))
     if len(stance) == len(SIDES):
         guards.append(Guard(MIDSTANCE, FORE.toe + HIND.toe - 2 * X))
-    # The CoM lies between the hips and the low points, so it is never the first to touch.
-    lows = {f"{side} hip": HIP[side][1] for side in HIP} | dict(body.low_points)
-    guards += [
-        Guard(f"{what} on the ground", height, arming=Arming.LEVEL, ends=FELL)
-        for what, height in lows.items()
-    ]
+    guards += _falls(body, features)
+    guards += [guard for leg in swing for guard in leg.looking()]
     observables = _observables(body, (*stance, *swing))
     observables["leg_energy"] = sp.Add(*(leg.energy for leg in stance))
     return Mode(phase, {**mechanics.definitions, **solving}, rates, tuple(guards), observables)
+
+
+def _falls(body: Body, features: Features) -> list[Guard]:
+    """A point of the body comes to the ground."""
+    if features.uneven:
+        return [
+            guard
+            for name, (x, y) in _low(body).items()
+            for below in [Underfoot.of(name)]
+            for guard in (clearance(below, x, y, FELL), *below.edges(x))
+        ]
+    # On flat ground the CoM, between all others, is never the first to touch it.
+    lows = {name: y for name, (_, y) in _low(body).items() if name != "CoM"}
+    return [
+        Guard(f"{what} on the ground", height, arming=Arming.LEVEL, ends=FELL)
+        for what, height in lows.items()
+    ]
 
 
 def _switching(spine: SwitchedSpine, energy: sp.Expr, guard: Guard) -> Guard:

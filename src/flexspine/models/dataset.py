@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 DEFAULT_INTERVAL = 1e-3
 
+# m; how much of the ground before and behind the run is kept.
+VICINITY = 3.0
+
 # More samples than this are a slip of the pen (a GiB and more), not a wish.
 MAX_SAMPLES = 2_000_000
 
@@ -140,8 +143,9 @@ def to_dataset(
     """Return the run as a Dataset over ``time`` (s), every ``interval`` seconds or at ``times``.
 
     ``phase`` is one of DF, FS, HS, DS. Events stand along ``event`` with ``event_time`` and
-    ``event_kind``. Attributes carry units, parameters, versions, tolerance and outcome. A run
-    that ended at its first instant has one sample at most. Raises `ParameterError`.
+    ``event_kind``; ground that is not flat along ``ground``. Attributes carry units, parameters,
+    versions, tolerance and outcome. A run that ended at its first instant has one sample at most.
+    Raises `ParameterError`.
     """
     import xarray as xr
 
@@ -159,6 +163,7 @@ def to_dataset(
     return xr.Dataset(
         data_vars={
             **data,
+            **_ground(run, columns),
             "phase": ("time", labels, {"long_name": "contact phase", "values": "DF FS HS DS"}),
             "event_time": ("event", np.array([e.time for e in events]), {"units": "s"}),
             "event_kind": ("event", np.array([" + ".join(e.names) for e in events], dtype=str)),
@@ -166,6 +171,19 @@ def to_dataset(
         coords={"time": ("time", grid, {"units": "s", "long_name": "time"})},
         attrs=_attributes(run),
     )
+
+
+def _ground(run: Run, columns: dict[str, Array]) -> dict[str, tuple[str, Array, dict[str, str]]]:
+    """The ground that the run passed over, as a polyline, where it is not flat."""
+    ground = run.model.ground
+    if ground is None or "com_x" not in columns:
+        return {}
+    x = columns["com_x"]
+    outline = ground.outline(float(x.min()) - VICINITY, float(x.max()) + VICINITY)
+    return {
+        f"ground_{axis}": ("ground", outline[:, i], {"units": "m", "long_name": text})
+        for i, (axis, text) in enumerate((("x", "points of the ground"), ("y", "their height")))
+    }
 
 
 def _attributes(run: Run) -> dict[str, str | float]:
@@ -180,6 +198,7 @@ def _attributes(run: Run) -> dict[str, str | float]:
         "parameters": json.dumps(values(model.parameters)),
         "touchdown_angles": json.dumps(dict(model.touchdown)),
         "apex": json.dumps(dict(model.apex)),
+        **({"ground": model.ground.name} if model.ground else {}),
         "provenance": json.dumps(dict(model.source.provenance)),
         "outcome": run.outcome.name,
         "message": run.outcome.message,

@@ -160,7 +160,7 @@ def _body(features: Features) -> Body:
         switched=SwitchedSpine(F - H, K_T, REST) if features.switched else None,
         power_lost=C_T * BEND_RATE**2 if features.damped_spine else sp.S.Zero,
         hips=hips,
-        low_points={"spine joint": joint[1]},
+        low_points={"spine joint": joint},
         observables={
             "spine_joint_x": joint[0],
             "spine_joint_y": joint[1],

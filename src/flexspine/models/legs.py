@@ -1,7 +1,7 @@
 """Massless spring legs: parameters, force, touchdown and lift-off.
 
 A leg pair acts as one leg. In flight it keeps its rest length and its touchdown angle from the
-vertical, foot ahead of the hip positive. In stance the toe is a frictionless pin on flat ground.
+vertical, foot ahead of the hip positive. In stance the toe is a frictionless pin on the ground.
 Source: Kamimura et al. 2015, Artif Life Robotics 20:270-275; dampers and actuators are additions.
 """
 
@@ -15,6 +15,7 @@ import sympy as sp
 from flexspine.hybrid.system import Arming, Guard
 from flexspine.mechanics.lagrangian import AppliedForce, Lagrangian, time_derivative
 from flexspine.models.actuation import Features, extension, hip_lever, stiffening
+from flexspine.models.underfoot import TOES
 from flexspine.parameters import ParameterSet, quantity
 
 SIDES = ("fore", "hind")
@@ -69,9 +70,9 @@ LEGS_PARAMETERS = {
 class LegSymbols:
     """The letters of one leg: parameters, touchdown angle, and what it remembers.
 
-    ``toe`` is where it stands or stood last (m), ``stanced`` whether it stood since the apex,
-    ``left`` its angle from the vertical at its latest lift-off (rad), ``pushes`` whether its thrust
-    has set in. The works of thrust and hip flow, in J.
+    ``toe`` and ``toe_height`` are where it stands or stood last (m), ``stanced`` whether it stood
+    since the apex, ``left`` its angle from the vertical at its latest lift-off (rad), ``pushes``
+    whether its thrust has set in. The works of thrust and hip flow, in J.
     """
 
     side: str
@@ -80,6 +81,7 @@ class LegSymbols:
     length: sp.Symbol
     gamma: sp.Symbol
     toe: sp.Symbol
+    toe_height: sp.Symbol
     stanced: sp.Symbol
     left: sp.Symbol
     stiffening: sp.Symbol
@@ -103,6 +105,7 @@ class LegSymbols:
                     "l",
                     "gamma",
                     "s",
+                    "z",
                     "n",
                     "beta",
                     "zeta",
@@ -150,7 +153,7 @@ class StanceLeg:
     ``F = k (l0 - l) - c l'``; what is computed is the strain-like ``sigma = F / (k l)``, which
     needs one root only, vanishes with the force and gives the force vector ``k sigma (u, Y)``. A
     hip torque ``d F`` adds ``k sigma d / l (Y, -u)`` and turns the body the other way. ``pitch`` is
-    that of what carries the hip: angle and rate.
+    that of what carries the hip: angle and rate. On flat ground ``Y`` is the height of the hip.
     """
 
     def __init__(
@@ -169,8 +172,13 @@ class StanceLeg:
         self.u, self.inverse, self.sigma, self.stretching = u, inverse, sigma, stretching
         self.definitions: dict[sp.Symbol, sp.Expr] = {
             u: hip[0] - leg.toe,
-            inverse: (u**2 + hip[1] ** 2) ** sp.Rational(-1, 2),
         }
+        self.rise = hip[1]
+        if features.uneven:
+            self.rise = sp.Symbol(f"v_{s}", real=True)
+            self.definitions[self.rise] = hip[1] - leg.toe_height
+        rise = self.rise
+        self.definitions[inverse] = (u**2 + rise**2) ** sp.Rational(-1, 2)
         self._stiffness, self._length = leg.k, leg.length
         if features.thrust:
             self._stiffness, self._length = stiffness, length
@@ -178,17 +186,15 @@ class StanceLeg:
             self.definitions[length] = leg.length + leg.all_extension * leg.pushes
         strain = self._length * inverse - 1
         if features.damped_legs or features.thrust:
-            self.definitions[stretching] = (
-                u * hip_velocity[0] + hip[1] * hip_velocity[1]
-            ) * inverse
+            self.definitions[stretching] = (u * hip_velocity[0] + rise * hip_velocity[1]) * inverse
         if features.damped_legs:
             strain -= leg.c / self._stiffness * stretching * inverse
         self.definitions[sigma] = strain
         pushes = sp.symbols(f"F_{s}x F_{s}y", real=True)
-        along: tuple[sp.Expr, sp.Expr] = (u, hip[1])
+        along: tuple[sp.Expr, sp.Expr] = (u, rise)
         if features.hips:
             turn = leg.all_lever * inverse
-            along = (u + turn * hip[1], hip[1] - turn * u)
+            along = (u + turn * rise, rise - turn * u)
         for push, way in zip(pushes, along, strict=True):
             self.definitions[push] = self._stiffness * sigma * way
         # The force of the leg on its hip; the ground reaction force has the same components.
@@ -197,7 +203,7 @@ class StanceLeg:
         self.applied: tuple[AppliedForce, ...] = (self.force,)
         if features.hips:
             torque = leg.all_lever * self._stiffness * sigma / inverse
-            swing = (u * hip_velocity[1] - hip[1] * hip_velocity[0]) * inverse**2
+            swing = (u * hip_velocity[1] - rise * hip_velocity[0]) * inverse**2
             self.hip_power = torque * (pitch[1] - swing)
             self.applied += (AppliedForce((torque,), (pitch[0],)),)
 
@@ -221,12 +227,15 @@ class StanceLeg:
         shorter may be released stretched. The leg is massless, so that energy is lost at the
         instant of release.
         """
-        resets = {self.leg.left: sp.atan(-self.u / self.hip[1])}
+        leg = self.leg
+        resets = {leg.left: sp.atan(-self.u / self.rise)}
+        if self._features.uneven:
+            resets |= TOES[leg.side].lost(self.hip[0] + leg.length * sp.sin(leg.gamma))
         if self._features.damped_legs or self._features.thrust:
             resets[dissipated] = dissipated + self.energy
         if self._features.thrust:
-            resets[self.leg.pushes] = sp.S.Zero
-        return Guard(f"{self.leg.side} lift-off", self.sigma, target, resets, arming=Arming.LEVEL)
+            resets[leg.pushes] = sp.S.Zero
+        return Guard(f"{leg.side} lift-off", self.sigma, target, resets, arming=Arming.LEVEL)
 
     def thrust(self) -> Guard:
         """At its greatest compression the leg begins to push, once a stance."""
@@ -241,13 +250,13 @@ class StanceLeg:
 
     def observables(self) -> dict[str, sp.Expr]:
         """Toe, length, angle and ground reaction force."""
-        side, leg, (_, height) = self.leg.side, self.leg, self.hip
+        side, leg = self.leg.side, self.leg
         force = self._stiffness * self.sigma / self.inverse
         table = {
             f"{side}_toe_x": leg.toe,
-            f"{side}_toe_y": sp.S.Zero,
+            f"{side}_toe_y": leg.toe_height if self._features.uneven else sp.S.Zero,
             f"{side}_leg_length": 1 / self.inverse,
-            f"{side}_leg_angle": sp.atan2(-self.u, height),
+            f"{side}_leg_angle": sp.atan2(-self.u, self.rise),
             f"{side}_grf_x": self.force.components[0],
             f"{side}_grf_y": self.force.components[1],
             f"{side}_grf": force,
@@ -261,30 +270,39 @@ class StanceLeg:
 class SwingLeg:
     """The expressions of a leg in the air."""
 
-    def __init__(self, leg: LegSymbols, hip: tuple[sp.Symbol, sp.Symbol]) -> None:
-        self.leg, self.hip = leg, hip
+    def __init__(
+        self, leg: LegSymbols, hip: tuple[sp.Symbol, sp.Symbol], features: Features
+    ) -> None:
+        self.leg, self._features = leg, features
+        self.toe = (
+            hip[0] + leg.length * sp.sin(leg.gamma),
+            hip[1] - leg.length * sp.cos(leg.gamma),
+        )
 
     def touchdown(self, target: str) -> Guard:
-        """The toe meets the ground when the hip falls through ``l0 cos(gamma)``.
+        """The toe falls to the ground; on flat ground the hip falls through ``l0 cos(gamma)``.
 
-        Falling through it needs having been above it, which is all that arming asks for. A leg
-        that lands while it lengthens would pull; it is released at the same instant, and still
-        counts as having stood.
+        Falling to it needs having been above it, which is all that arming asks for. A leg that
+        lands while it lengthens would pull; it is released at the same instant, and still counts
+        as having stood.
         """
-        leg, (x, y) = self.leg, self.hip
-        return Guard(
-            f"{leg.side} touchdown",
-            y - leg.length * sp.cos(leg.gamma),
-            target,
-            {leg.toe: x + leg.length * sp.sin(leg.gamma), leg.stanced: sp.S.One},
-        )
+        leg, (x, y) = self.leg, self.toe
+        resets = {leg.toe: x, leg.stanced: sp.S.One}
+        if self._features.uneven:
+            resets[leg.toe_height] = y
+            y = y - TOES[leg.side].height(x)
+        return Guard(f"{leg.side} touchdown", y, target, resets)
+
+    def looking(self) -> tuple[Guard, ...]:
+        """The toe comes to the end of a piece of ground."""
+        return TOES[self.leg.side].edges(self.toe[0]) if self._features.uneven else ()
 
     def observables(self) -> dict[str, sp.Expr]:
         """As in stance; the toe is where the leg held out for touchdown has it."""
-        side, leg, (x, y) = self.leg.side, self.leg, self.hip
+        side, leg = self.leg.side, self.leg
         return {
-            f"{side}_toe_x": x + leg.length * sp.sin(leg.gamma),
-            f"{side}_toe_y": y - leg.length * sp.cos(leg.gamma),
+            f"{side}_toe_x": self.toe[0],
+            f"{side}_toe_y": self.toe[1],
             f"{side}_leg_length": leg.length,
             f"{side}_leg_angle": leg.gamma,
             f"{side}_grf_x": sp.S.Zero,

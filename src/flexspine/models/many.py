@@ -182,6 +182,7 @@ def make_cases(model: Model, given: Mapping[str, ArrayLike], body: Model | None 
     """
     if not isinstance(model, Model):
         raise ParameterError(f"{shortened(model)} is no model", "load one with load_model")
+    model.on_flat_ground("many runs at once")
     known = {*model.apex, *model.parameter_names}
     bounds = _bounds(model)
     varied: dict[str, Array] = {}

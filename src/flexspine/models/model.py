@@ -15,8 +15,10 @@ from flexspine.hybrid.compile import Array, BoundSystem, compile_system
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.actuation import ACTUATORS, BARE, HIP_LEVER, Features
-from flexspine.models.bounder import FORE, HIND, BounderKind, works
+from flexspine.models.bounder import FORE, HIND, BounderKind, beneath, works
+from flexspine.models.ground import Ground
 from flexspine.models.legs import SIDES, phase_of
+from flexspine.models.underfoot import OnGround, begin
 from flexspine.parameters import ParameterSet, is_number, replaced, shortened, values
 
 # Below the first, rounding exceeds the truncation; above the second, nothing said here holds.
@@ -51,7 +53,8 @@ class Model:
 
     ``apex`` is the start, by section coordinate; ``touchdown`` the angle of each leg from the
     vertical at touchdown, foot ahead of the hip positive. ``kept`` are dampers and actuators
-    whose terms stay in the equations even where their numbers vanish.
+    whose terms stay in the equations even where their numbers vanish. The apex height is above the
+    ``ground`` at x = 0, which is flat and at height 0 if none is given.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Model:
     touchdown: Mapping[str, float]
     source: Source
     kept: Features = BARE
+    ground: Ground | None = None
 
     def __post_init__(self) -> None:
         coordinates = self.system.section.coordinates
@@ -119,11 +123,24 @@ class Model:
     @cached_property
     def features(self) -> Features:
         """The dampers and actuators that its equations know."""
-        return Features.of(values(self.parameters)) | self.kept
+        uneven = Features(uneven=self.ground is not None)
+        return Features.of(values(self.parameters)) | self.kept | uneven
 
     def keeping(self, names: Iterable[str]) -> Model:
         """Return the same model, its equations ready for these parameters to be other than zero."""
         return replace(self, kept=self.kept | Features.of(dict.fromkeys(names, 1.0)))
+
+    def on(self, ground: Ground | None) -> Model:
+        """Return the same model on other ground; None is flat."""
+        return replace(self, ground=ground)
+
+    def on_flat_ground(self, what: str) -> None:
+        """Raise `ParameterError` where ``what`` is asked for on ground that is not flat."""
+        if self.ground is not None:
+            raise ParameterError(
+                f"{what} on {self.ground.name} cannot be had, only on flat ground",
+                "leave the ground away",
+            )
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
@@ -196,13 +213,19 @@ class Model:
         Raises `ParameterError` for a tolerance that is not usable.
         """
         tolerance = check_between("tolerance", tolerance, *TOLERANCES)
-        return BoundSystem(compile_system(self.system, tolerance), self.parameter_vector)
+        compiled = compile_system(self.system, tolerance)
+        if self.ground is None:
+            return BoundSystem(compiled, self.parameter_vector)
+        return OnGround(compiled, self.parameter_vector, self.ground)
 
     def apex_state(self) -> HybridState:
         """The start in flight, at the apex."""
         name_of = dict(zip(self.system.states, self.state_names, strict=True))
         section = self.system.section.coordinates
-        return self.state({name_of[symbol]: self.apex[c] for c, symbol in section.items()})
+        start = {name_of[symbol]: self.apex[c] for c, symbol in section.items()}
+        if self.ground is not None:
+            start["com_y"] += self.ground.height(0.0)
+        return self.state(start)
 
     def state(
         self, start: Mapping[str, float], toes: Mapping[str, float] | None = None
@@ -219,6 +242,13 @@ class Model:
         for leg in (FORE, HIND):
             held[self.system.places[leg.toe]] = toes.get(leg.side, states[0])
             held[self.system.places[leg.stanced]] = leg.side in toes
+            if self.ground is not None:
+                held[self.system.places[leg.toe_height]] = self.ground.height(
+                    held[self.system.places[leg.toe]]
+                )
+        if self.ground is not None:
+            points = beneath(self.kind.body(BARE))
+            begin(self.ground, held, self.system.places, float(states[0]), points)
         return HybridState(0.0, phase_of(toes), states, held)
 
 

@@ -19,10 +19,11 @@ from flexspine.report.caption import ending, heading
 from flexspine.report.postures import Posture, postures
 from flexspine.report.robot_scene import RobotScene
 from flexspine.report.scene import Scene, pill, view_of
-from flexspine.report.stage import DOTS, View, add_force_key, draw_ground, draw_strokes, write
+from flexspine.report.stage import DOTS, View, add_force_key, draw_ground, draw_heights, write
 from flexspine.report.stick_figure import Scale, StickFigure, bend_palette
 from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
 from flexspine.report.timeline import check_samples, drawable, is_robot, last_cycle
+from flexspine.report.way import Way
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -189,7 +190,8 @@ def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
         raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
     shown = postures(dataset, np.linspace(*last_cycle(dataset), frames))
     scale = Scale.of(dataset)
-    view = view_of(shown, scale)
+    way = Way.of(dataset)
+    view = view_of(shown, scale, way)
     metre = CELL / (2 * view.aside)  # in
     height = (view.high - view.low) * metre
     rows = [shown[i : i + PER_ROW] for i in range(0, frames, PER_ROW)]
@@ -203,17 +205,20 @@ def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
                 (0.6 / size[0], foot / size[1], len(row) * CELL / size[0], height / size[1])
             )
             axes.set_xlim(-view.aside, (2 * len(row) - 1) * view.aside)
-            _draw_row(axes, row, view, scale, metre)
+            _draw_row(axes, row, view, scale, metre, way)
         add_force_key(figure, (0.6, 0.2), scale, metre)
         _write_heading(figure, dataset, shown)
     return figure
 
 
-def _draw_row(axes: Axes, row: list[Posture], view: View, scale: Scale, metre: float) -> None:
+def _draw_row(
+    axes: Axes, row: list[Posture], view: View, scale: Scale, metre: float, way: Way | None
+) -> None:
     """Draw postures side by side, each with its phase and time (s) below."""
-    draw_ground(axes, view)
-    draw_strokes(axes, axes.get_xlim(), scale)
-    axes.set_ylabel("height (m)")
+    draw_heights(axes, view)
+    if way is None:
+        draw_ground(axes, axes.get_xlim(), scale)
+    axes.set_ylabel("height over the way (m)" if way is not None and way.climbs else "height (m)")
     axes.spines["bottom"].set_visible(False)
     axes.set_xticks([])
     style: dict[str, Any] = {
@@ -222,7 +227,12 @@ def _draw_row(axes: Axes, row: list[Posture], view: View, scale: Scale, metre: f
     }  # fmt: skip
     for number, posture in enumerate(row):
         middle = 2 * view.aside * number
-        StickFigure(axes, scale, 72 * metre, posture).show(posture, middle - posture.com[0])
+        x = posture.com[0]
+        shift = middle - x, 0.0 if way is None else -way.level(x)
+        if way is not None:
+            near = way.between(x - view.aside, x + view.aside).moved(shift)
+            draw_ground(axes, (middle - view.aside, middle + view.aside), scale, near)
+        StickFigure(axes, scale, 72 * metre, posture).show(posture, shift)
         box = pill(posture.phase)
         axes.annotate(posture.phase, (middle, 0), (-20, -8), bbox=box, fontweight="bold", **style)
         axes.annotate(f"{posture.time:.3f} s", (middle, 0), (14, -8), **style)

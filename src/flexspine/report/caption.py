@@ -32,7 +32,8 @@ def describe(dataset: xr.Dataset) -> list[str]:
         spine = ", ".join(part.split(maxsplit=2)[2] for part in _of_spine(given))
         parts = [*_of_task(dataset), f"spine {spine}"] if spine else _of_task(dataset)
         return joined(parts + _mean_speed(dataset), WIDE) + _changed(dataset)
-    parts = _of_spine(given)
+    parts = [dataset.attrs["ground"]] if "ground" in dataset.attrs else []
+    parts += _of_spine(given)
     parts += of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     if any(given.get(f"{side}.leg.damping") for side in SIDES):
         parts += of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")

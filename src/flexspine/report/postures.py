@@ -10,6 +10,7 @@ import numpy as np
 
 from flexspine.models.legs import STANCE_PHASES
 from flexspine.report.timeline import Span, apex_times, phase_spans
+from flexspine.report.way import Way, heights
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +74,7 @@ def postures(dataset: xr.Dataset, times: Array) -> list[Posture]:
     """Return the postures at ``times`` (s), interpolated between the samples.
 
     Legs in stance and their forces are the dataset's. Legs in the air are made up: from lift-off
-    they turn to their touchdown angle, drawn in so that the toe clears the ground.
+    they turn to their touchdown angle, drawn in so that the toe clears the ground below it.
     """
     spans = phase_spans(dataset)
     starts = np.array([span.start for span in spans])
@@ -106,20 +107,23 @@ def _points(dataset: xr.Dataset, name: str, times: Array) -> list[Point]:
 def _legs(
     dataset: xr.Dataset, side: str, spans: list[Span], phases: list[str], times: Array
 ) -> list[LegPosture]:
+    way = Way.of(dataset)
     hips = np.array(_points(dataset, f"{side}_hip", times)).reshape(-1, 2)
     toes = hips.copy()
     stands = np.array([phase in STANCE_PHASES[side] for phase in phases], dtype=bool)
     stances = _stances(spans, side)
-    toe_x = dataset[f"{side}_toe_x"].values
+    toe_x, toe_y = (dataset[f"{side}_toe_{axis}"].values for axis in "xy")
     sample = np.searchsorted(dataset["time"].values, times, side="right") - 1
     for stance in stances:
         now = stands & (times >= stance.start) & (times <= stance.end)
-        toes[now, 0] = toe_x[sample[now].clip(stance.first, stance.last)]
-        toes[now, 1] = 0.0
+        standing = sample[now].clip(stance.first, stance.last)
+        toes[now] = np.column_stack([toe_x[standing], toe_y[standing]])
     for begin, end, swing in _swings(dataset, side, stances):
         now = ~stands & (times >= begin) & (times <= end)
-        toes[now] = hips[now] + _swinging(swing, times[now], hips[now, 1])
-    toes[:, 1] = toes[:, 1].clip(min=0.0)  # not below the ground by a rounding error either
+        above = hips[now, 1] - heights(way, hips[now, 0])
+        toes[now] = hips[now] + _swinging(swing, times[now], above)
+    # Not below the ground by a rounding error either.
+    toes[:, 1] = np.maximum(toes[:, 1], heights(way, toes[:, 0]))
     forces = np.column_stack([_at(dataset, f"{side}_grf_{axis}", times) for axis in "xy"])
     forces[~stands] = 0.0
     return [
@@ -201,7 +205,8 @@ def _geometry(dataset: xr.Dataset, side: str, stance: _Stance) -> tuple[float, f
     """Angle (rad) and length (m) of the leg at lift-off."""
     ((hip_x, hip_y),) = _points(dataset, f"{side}_hip", np.array([stance.end]))
     ahead = float(dataset[f"{side}_toe_x"][stance.last]) - hip_x
-    return float(np.arctan2(ahead, hip_y)), float(np.hypot(ahead, hip_y))
+    above = hip_y - float(dataset[f"{side}_toe_y"][stance.last])
+    return float(np.arctan2(ahead, above)), float(np.hypot(ahead, above))
 
 
 def _swinging(swing: _Swing, times: Array, hip_height: Array) -> Array:

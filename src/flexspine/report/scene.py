@@ -18,6 +18,7 @@ from flexspine.report.timeline import (
     phase_spans,
     window,
 )
+from flexspine.report.way import Way
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,11 +30,15 @@ if TYPE_CHECKING:
 BEND = LEFT + 2.6  # in; where the bend of the spine is told
 
 
-def view_of(shown: Sequence[Posture], scale: Scale) -> View:
+def view_of(shown: Sequence[Posture], scale: Scale, way: Way | None = None) -> View:
     """Return the smallest view that holds all postures, their arrows and some air."""
-    return View.around(
-        ((x - posture.com[0], y) for posture in shown for x, y in _outline(posture, scale)), scale
-    )
+
+    def seen(posture: Posture) -> Iterable[Point]:
+        level = way.level(posture.com[0]) if way is not None else 0.0
+        for x, y in _outline(posture, scale):
+            yield x - posture.com[0], y - level
+
+    return View.around((point for posture in shown for point in seen(posture)), scale)
 
 
 def _outline(posture: Posture, scale: Scale) -> Iterable[Point]:
@@ -58,8 +63,9 @@ class Scene:
             draw_phase_bar(axes, spans, limits)
             label_phases(axes, spans, STAGE)
 
-        view = view_of(self.postures, self.scale)
-        scenery = Scenery(view, self.scale, limits, (min(x), max(x)), slow_down, draw_bar)
+        way = Way.of(dataset)
+        view = view_of(self.postures, self.scale, way)
+        scenery = Scenery(view, self.scale, limits, (min(x), max(x)), slow_down, draw_bar, way=way)
         self.stage = Stage(dataset, scenery)
         self.figure = self.stage.figure
         self.animal = StickFigure(self.stage.axes, self.scale, self.stage.metre, self.postures[0])

@@ -22,6 +22,7 @@ from matplotlib.ticker import MultipleLocator
 from flexspine.report.caption import describe, ending, heading
 from flexspine.report.stick_figure import ARROW_LENGTH, ARROW_WIDTH, Scale, arrow_outline
 from flexspine.report.style import FAINT, INK, SMALL_SIZE, TEXT_SIZE, TITLE_SIZE
+from flexspine.report.way import Way, heights
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,6 +74,7 @@ class Scenery:
 
     ``limits`` are the times (s) that are shown, ``reach`` is where the CoM gets (m). ``draw_bar``
     fills the bar of phases, which is ``bar`` in high, and ``force_of`` is whose force is drawn.
+    ``way`` is the ground where it is not flat.
     """
 
     view: View
@@ -83,6 +85,7 @@ class Scenery:
     draw_bar: Callable[[Axes], None]
     bar: float = BAR_HEIGHT
     force_of: str = "per leg pair"
+    way: Way | None = None
 
     @property
     def foot(self) -> float:
@@ -118,6 +121,9 @@ class Stage:
     def follow(self, time: float, x: float) -> None:
         """Bring the camera to ``x`` (m), cursor and clock to a time (s)."""
         self.axes.set_xlim(x - self.view.aside, x + self.view.aside)
+        if self.scenery.way is not None:
+            level = self.scenery.way.level(x)
+            self.axes.set_ylim(self.view.low + level, self.view.high + level)
         start, end = self.scenery.limits
         passed = (time - start) / (end - start)
         low, high = BAR_FOOT - 0.05, BAR_FOOT + self.scenery.bar + 0.05
@@ -131,7 +137,8 @@ class Stage:
         axes.spines[:].set_visible(False)
         axes.yaxis.set_visible(False)
         aside, (first, last) = self.view.aside, self.scenery.reach
-        draw_strokes(axes, (first - aside, last + aside), self.scenery.scale)
+        reach = first - aside, last + aside
+        draw_ground(axes, reach, self.scenery.scale, self.scenery.way)
         axes.xaxis.set_major_locator(MultipleLocator(round_down(2 * aside / 5)))
         return axes
 
@@ -151,9 +158,10 @@ class _Backdrop(Artist):
 def _draw_backdrop(dataset: xr.Dataset, scenery: Scenery) -> NDArray[np.uint8]:
     figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS)
     axes, foot = _axes(figure, scenery), scenery.foot
-    draw_ground(axes, scenery.fitted)
+    draw_heights(axes, scenery.fitted)
     axes.tick_params(bottom=False, labelbottom=False)
-    axes.set_ylabel("height (m)")
+    moves = scenery.way is not None and scenery.way.climbs
+    axes.set_ylabel("height over the way (m)" if moves else "height (m)")
     write(figure, (LEFT + STAGE / 2, foot - 0.37), "position (m)", size=TEXT_SIZE, ha="center")
     metre = STAGE / (2 * scenery.fitted.aside)
     add_force_key(figure, (LEFT, foot - 0.375), scenery.scale, metre, scenery.force_of)
@@ -182,20 +190,24 @@ def _axes(figure: Figure, scenery: Scenery) -> Axes:
     return axes
 
 
-def draw_ground(axes: Axes, view: View) -> None:
-    """Draw the ground, and heights only above it."""
+def draw_heights(axes: Axes, view: View) -> None:
+    """Draw the scale of heights, from the ground on."""
     axes.set_ylim(view.low, view.high)
     axes.set_yticks([y for y in axes.get_yticks() if 0 <= y <= view.high])
     axes.spines["left"].set_bounds(0, view.high)
-    axes.axhline(0, color=INK, linewidth=1.0, zorder=2.5)
 
 
-def draw_strokes(axes: Axes, reach: tuple[float, float], scale: Scale) -> None:
-    """Draw strokes in the ground over ``reach`` (m), which show how it passes."""
+def draw_ground(
+    axes: Axes, reach: tuple[float, float], scale: Scale, way: Way | None = None
+) -> None:
+    """Draw the ground, flat or ``way``, with strokes over ``reach`` (m) that show how it passes."""
     step = round_down(0.3 * scale.leg)
     x = step * np.arange(np.floor(reach[0] / step), np.ceil(reach[1] / step) + 1)
+    y = heights(way, x)
+    outline = np.array([[reach[0], 0.0], [reach[1], 0.0]]) if way is None else way.points
+    axes.plot(*outline.T, color=INK, linewidth=1.0, zorder=2.5)
     depth = 0.35 * step
-    strokes = [[(at, 0.0), (at - depth, -depth)] for at in x]
+    strokes = [[(at, top), (at - depth, top - depth)] for at, top in zip(x, y, strict=True)]
     axes.add_collection(LineCollection(strokes, colors=FAINT, linewidths=0.8, zorder=1))
 
 

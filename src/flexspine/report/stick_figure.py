@@ -125,21 +125,21 @@ class StickFigure:
             self.spring = (canvas.line(8, width=0.052), canvas.line(8.1, width=0.03))
         self.com = canvas.com(9)
 
-    def show(self, posture: Posture, shift: float = 0.0) -> None:
-        """Move to a posture, ``shift`` m ahead of where it is."""
+    def show(self, posture: Posture, shift: Point = (0.0, 0.0)) -> None:
+        """Move to a posture, ``shift`` m ahead of and above where it is."""
         ends = [posture.legs[side].hip for side in ("hind", "fore")]
         nodes = [ends[0], posture.joint, ends[1]] if posture.joint is not None else ends
         for lines, (start, end) in zip(self.trunk, pairwise(nodes), strict=True):
             for line in lines:
-                line.set_data([start[0] + shift, end[0] + shift], [start[1], end[1]])
+                line.set_data(*np.transpose([_moved(start, shift), _moved(end, shift)]))
         for side, leg in posture.legs.items():
             self._show_leg(side, leg, shift)
         if posture.joint is not None and posture.bend is not None:
             self._show_spring(posture, posture.joint, posture.bend, shift)
         for artist in self.com:
-            artist.set_data([posture.com[0] + shift], [posture.com[1]])
+            artist.set_data(*_moved(posture.com, shift)[:, None])
 
-    def _show_leg(self, side: str, leg: LegPosture, shift: float) -> None:
+    def _show_leg(self, side: str, leg: LegPosture, shift: Point) -> None:
         hip, toe = _moved(leg.hip, shift), _moved(leg.toe, shift)
         # A leg in the air carries nothing: thin and pale.
         line, dot = self.legs[side], self.toes[side]
@@ -155,7 +155,7 @@ class StickFigure:
         arrow.set_visible(bool(np.hypot(*force) > 0.02 * self.scale.leg))
         arrow.set_xy(arrow_outline(toe - force, toe, ARROW_WIDTH * self.scale.leg))
 
-    def _show_spring(self, posture: Posture, joint: Point, bend: float, shift: float) -> None:
+    def _show_spring(self, posture: Posture, joint: Point, bend: float, shift: Point) -> None:
         centre = _moved(joint, shift)
         fore, hind = (np.array(posture.legs[side].hip) - joint for side in SIDES)
         start = float(np.arctan2(fore[1], fore[0]))
@@ -233,5 +233,5 @@ def bend_palette(count: int) -> list[tuple[int, int, int]]:
     return [(red, green, blue) for red, green, blue in levels.tolist()]
 
 
-def _moved(point: Point, shift: float) -> Array:
-    return np.array([point[0] + shift, point[1]])
+def _moved(point: Point, shift: Point) -> Array:
+    return np.array([point[0] + shift[0], point[1] + shift[1]])

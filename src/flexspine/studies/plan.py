@@ -179,6 +179,8 @@ def _check(plan: Plan) -> None:
             raise UnknownNameError(what, str(given), known)
     if not plan.models:
         raise InputError("there is no model", "give one or more")
+    for model in plan.models:
+        model.on_flat_ground("a sweep")
     _check_once("model", [model.name for model in plan.models])
     _check_once("axis", [axis.name for axis in plan.axes])
     if not (type(plan.seed) is int and 0 <= plan.seed < SEEDS):

@@ -1,0 +1,222 @@
+"""The largest noise, push and step that gaits under feedback survive, over stiffness and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexspine._version import __version__
+from flexspine.control.disturbance import disturbance, endure
+from flexspine.control.stabilize import Stabilizer, stabilize
+from flexspine.errors import FlexspineError, ParameterError
+from flexspine.gaits.gait import Gait, examine
+from flexspine.gaits.problem import ANGLES
+from flexspine.gaits.stability import floquet_multipliers
+from flexspine.models.model import Model
+from flexspine.models.simulation import check_count
+from flexspine.studies.following import Line, LostGaitError, carried
+from flexspine.workers.journal import Journal
+from flexspine.workers.local import LocalWorkers
+
+# Relative; limits are known to it, and are on the safe side.
+PRECISION = 0.1
+
+# Of a disturbance's usual largest size: where the search begins, and where it gives up.
+FIRST, SMALLEST, LARGEST = 2.0**-5, 2.0**-14, 8.0
+
+SEEDS = 6
+PLACES = 8
+NOISY_STRIDES, UPSET_STRIDES = 1000, 50
+
+THRUST = "legs.extension"
+
+
+class Design(NamedTuple):
+    """A way to stabilise: what is steered, and whether at both flight apexes."""
+
+    name: str
+    inputs: tuple[str, ...]
+    twice: bool
+
+
+DESIGNS = (
+    Design("angles, once", ANGLES, False),
+    Design("angles, twice", ANGLES, True),
+    Design("angles and thrust, twice", (*ANGLES, THRUST), True),
+)
+
+
+class Limit(NamedTuple):
+    """A kind of limit: which disturbance, to which side, in how many strides, and which tries."""
+
+    name: str
+    kind: str
+    sign: int
+    strides: int
+    tries: tuple[tuple[float, int], ...]
+
+
+_SEEDED = tuple((0.0, seed) for seed in range(SEEDS))
+_ANYWHERE = tuple((k / PLACES, 0) for k in range(PLACES))
+
+LIMITS = (
+    Limit("acting_noise", "acting", 1, NOISY_STRIDES, _SEEDED),
+    Limit("sensing_noise", "sensing", 1, NOISY_STRIDES, _SEEDED),
+    Limit("push_forward", "push", 1, UPSET_STRIDES, ((0.0, 0),)),
+    Limit("push_backward", "push", -1, UPSET_STRIDES, ((0.0, 0),)),
+    Limit("step_up", "step", 1, UPSET_STRIDES, _ANYWHERE),
+    Limit("step_down", "step", -1, UPSET_STRIDES, _ANYWHERE),
+)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A gait under one design: spectral radii without and with feedback, and its limits, SI.
+
+    Without a gait, or feedback that stabilises it, ``reason`` tells why.
+    """
+
+    stiffness: float
+    speed: float
+    design: str
+    radius: float | None
+    steered_radius: float | None
+    limits: Mapping[str, float]
+    reason: str | None
+
+
+def largest(stabilizer: Stabilizer, limit: Limit) -> float:
+    """The largest size at which all tries survive, by doubling, halving and bisection, SI.
+
+    That smaller ones are survived is taken for granted. Zero where even next to nothing is not.
+    """
+    kind = disturbance(limit.kind)
+
+    def fine(size: float) -> bool:
+        return all(
+            endure(stabilizer, kind, limit.sign * size, where, seed, limit.strides).strides
+            == limit.strides
+            for where, seed in limit.tries
+        )
+
+    low = high = kind.largest * FIRST
+    if fine(low):
+        while fine(high := 2 * low):
+            if high > kind.largest * LARGEST:
+                return high
+            low = high
+    else:
+        while not fine(low := high / 2):
+            if low < kind.largest * SMALLEST:
+                return 0.0
+            high = low
+    while high > low * (1 + PRECISION):
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if fine(middle) else (low, middle)
+    return low
+
+
+class _Piece(NamedTuple):
+    stiffness: float
+    speed: float
+    gait: Gait | None
+    design: Design
+    limits: tuple[Limit, ...]
+    reason: str | None
+
+
+def find_limits(
+    model: Model,
+    stiffnesses: Sequence[float],
+    speeds: Sequence[float],
+    *,
+    designs: Sequence[Design] = DESIGNS,
+    limits: Sequence[Limit] = LIMITS,
+    processes: int = 1,
+    store: Path | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+) -> list[Cell]:
+    """Find the limits of the model's gait at every spine stiffness (N m/rad) and mean speed (m/s).
+
+    ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
+    share the work without a change to results. Raises `ParameterError` and `OutputError`.
+    """
+    if not (stiffnesses and speeds):
+        raise ParameterError("no stiffness or no speed is given", "give at least one of each")
+    pieces = [
+        _Piece(stiffness, speed, gait, design, tuple(limits), reason)
+        for stiffness, speed, gait, reason in _gaits(model, stiffnesses, speeds)
+        for design in designs
+    ]
+    journal, done = None, dict[int, Cell]()
+    if store is not None:
+        header = {
+            "flexspine": __version__, "model": model.name, "numbers": model.numbers,
+            "stiffnesses": list(stiffnesses), "speeds": list(speeds),
+            "designs": [list(design) for design in designs],
+            "limits": [list(limit) for limit in limits],
+        }  # fmt: skip
+        journal = Journal(store, header, "limits", _is_line)
+        done = {line["piece"]: Cell(**line["cell"]) for line in journal.lines}
+
+    def jobs() -> Iterator[tuple[int, _Piece]]:
+        return ((k, piece) for k, piece in enumerate(pieces) if k not in done)
+
+    progress(len(done), len(pieces))
+    with LocalWorkers(check_count("processes", processes)) as crew:
+        for number, cell in crew.map(_examine_piece, jobs()):
+            done[number] = cell
+            if journal is not None:
+                journal.add({"piece": number, "cell": vars(cell)})
+            progress(len(done), len(pieces))
+    return [done[k] for k in range(len(pieces))]
+
+
+def _gaits(
+    model: Model, stiffnesses: Sequence[float], speeds: Sequence[float]
+) -> Iterator[tuple[float, float, Gait | None, str | None]]:
+    """The gait at each stiffness and speed, or why there is none."""
+    own = examine(model)
+    if own.flaw is not None:
+        raise ParameterError(f"the start of '{model.name}' is no gait ({own.flaw})", "give a gait")
+    for stiffness in stiffnesses:
+        try:
+            line = Line.through(
+                carried(own, "spine.stiffness", stiffness), "mean_speed", np.array(speeds), None
+            )
+        except LostGaitError as lost:
+            for speed in speeds:
+                yield stiffness, speed, None, str(lost)
+            continue
+        for speed in speeds:
+            found = line.at(speed)
+            if found is None:
+                yield stiffness, speed, None, line.end
+            else:
+                yield stiffness, speed, found[0], None
+
+
+def _examine_piece(piece: _Piece) -> Cell:
+    radius = None
+    try:
+        if piece.gait is None:
+            raise FlexspineError(piece.reason or "", "")
+        radius = floquet_multipliers(piece.gait).spectral_radius
+        found = stabilize(piece.gait, piece.design.inputs, twice=piece.design.twice)
+    except FlexspineError as failure:
+        return Cell(
+            piece.stiffness, piece.speed, piece.design.name, radius, None, {}, failure.message
+        )
+    limits = {limit.name: largest(found, limit) for limit in piece.limits}
+    return Cell(
+        piece.stiffness, piece.speed, piece.design.name, radius, found.level_spectral_radius,
+        limits, None,
+    )  # fmt: skip
+
+
+def _is_line(line: Any) -> bool:
+    return isinstance(line, dict) and line.keys() >= {"piece", "cell"}
