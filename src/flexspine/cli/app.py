@@ -17,6 +17,7 @@ from flexspine.cli import (
     bound,
     branch,
     cache,
+    control,
     equations,
     forces,
     gait,
@@ -59,6 +60,7 @@ app.command("sweep")(sweep.sweep)
 app.command("rerun")(sweep.rerun)
 app.command("basin")(basin.basin)
 app.command("map")(gait_map.gait_map)
+app.command("control")(control.control)
 app.command("trot")(trot.trot)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)

@@ -70,6 +70,17 @@ class ResultDirectory:
         with self.stage(PICTURES) as stage:
             _write_all(stage, run, record, interval, animation, progress)
 
+    @contextmanager
+    def stage_run(
+        self, run: Run, record: dict[str, Any], animation: bool, progress: Steps
+    ) -> Iterator[Path]:
+        """Write everything there is about a run, together with what the block adds."""
+        from flexspine.models.dataset import DEFAULT_INTERVAL
+
+        with self.stage(PICTURES) as stage:
+            _write_all(stage, run, record, DEFAULT_INTERVAL, animation, progress)
+            yield stage
+
     def __enter__(self) -> Self:
         return self
 

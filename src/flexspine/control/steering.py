@@ -156,6 +156,11 @@ class SteeredBounder(OnGround):
         done = np.where(self._angles, np.clip(done, -STEEPEST, STEEPEST), done)
         return done if before is None else np.where(wanted == before, before, done)
 
+    def inputs_of(self, point: HybridState) -> dict[str, float]:
+        """What is steered at a point, by name."""
+        now = point.held[self._inputs].tolist()
+        return dict(zip(self.steering.inputs, now, strict=True))
+
     def alone(self, point: HybridState) -> bool:
         """Whether one leg only has stood since the latest apex after both."""
         return bool(point.held[self._stood].sum() == 1)
@@ -173,11 +178,18 @@ def _between(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | 
 
 @dataclass(frozen=True)
 class SteeredRun(Run):
-    """A run that was steered."""
+    """A run that was steered; ``model`` is where it began."""
 
     steering: Steering = field(kw_only=True)
     noise: Noise = field(kw_only=True)
     seed: int = field(kw_only=True)
+
+    @property
+    def inputs(self) -> list[dict[str, float]]:
+        """What was steered, from each apex of `apexes` on, by name."""
+        bound = self.trajectory.bound
+        assert isinstance(bound, SteeredBounder)
+        return [bound.inputs_of(point) for point in self.section_points]
 
 
 def steer(

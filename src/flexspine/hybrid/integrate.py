@@ -394,6 +394,7 @@ class _Run:
                 return
             if found is not None:
                 _, self.mode, self.states, self.held = found
+                self.crossings[-1] = self._here()
         self.steps_left, self.limit = self.max_steps, self._limit()
         if len(self.crossings) == self.wanted:
             self.outcome = Outcome(COMPLETED, f"{self.wanted} x {self._section_name}")

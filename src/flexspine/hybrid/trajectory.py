@@ -86,8 +86,8 @@ class Arc:
 class Trajectory:
     """A run of a hybrid system. Without recording ``arcs`` is empty, all else is there.
 
-    ``crossings`` are the points on the section, taken after its resets; ``steps`` counts Taylor
-    steps.
+    ``crossings`` are the points on the section, taken after its resets and what is done there;
+    ``steps`` counts Taylor steps.
     """
 
     bound: BoundSystem

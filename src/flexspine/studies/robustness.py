@@ -138,7 +138,7 @@ class _Piece(NamedTuple):
     strides: int
     seed: int
     first: int
-    count: int
+    runs: int
 
 
 def survive(
@@ -212,7 +212,7 @@ def _run_piece(piece: _Piece) -> list[Fate]:
     kind = disturbance(piece.kind)
     return [
         endure(piece.stabilizer, kind, *draw(kind, piece.largest, piece.seed, k), piece.strides)
-        for k in range(piece.first, piece.first + piece.count)
+        for k in range(piece.first, piece.first + piece.runs)
     ]
 
 

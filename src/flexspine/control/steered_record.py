@@ -1,0 +1,95 @@
+"""A run under feedback as one JSON object, and its apexes as a table."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from flexspine._version import SCHEMA_VERSION
+from flexspine.control.stabilize import Stabilizer
+from flexspine.control.steering import SteeredRun
+from flexspine.gaits.record import finite
+from flexspine.gaits.stability import floquet_multipliers
+from flexspine.parameters import values
+
+
+def stabilizer_record(stabilizer: Stabilizer) -> dict[str, Any]:
+    """The gait, what is steered, gains in natural units, multipliers without and with feedback."""
+    gait = stabilizer.gait
+    free = floquet_multipliers(gait)
+    return {
+        "preset": gait.model.name,
+        "model": gait.model.kind.name,
+        "parameters": values(gait.model.parameters),
+        "apex": dict(gait.model.apex),
+        "touchdown_angles": dict(gait.model.touchdown),
+        "mean_speed": gait.mean_speed,
+        "energy": gait.energy,
+        "inputs": list(stabilizer.inputs),
+        "method": stabilizer.method,
+        "acts_per_stride": len(stabilizer.parts),
+        "gains": [gain.tolist() for gain in stabilizer.gains],
+        "floquet_multipliers": {
+            "without": [[value.real, value.imag] for value in free.multipliers],
+            "with": [[value.real, value.imag] for value in stabilizer.multipliers.tolist()],
+        },
+        "spectral_radius": {
+            "without": free.spectral_radius,
+            "with": float(np.abs(stabilizer.multipliers[0])),
+            "with, on the energy level": stabilizer.level_spectral_radius,
+        },
+    }
+
+
+def steered_record(run: SteeredRun, stabilizer: Stabilizer) -> dict[str, Any]:
+    """How a run under feedback went; SI and radians, deviations in natural units."""
+    start, end = run.trajectory.start, run.trajectory.end
+    distance = float(end.states[0] - start.states[0])
+    rows = apex_table(run, stabilizer)
+    record = {
+        "schema_version": SCHEMA_VERSION,
+        **stabilizer_record(stabilizer),
+        "noise": asdict(run.noise),
+        "seed": run.seed,
+        "ground": run.model.ground.name if run.model.ground else None,
+        "outcome": run.outcome.name,
+        "message": run.outcome.message,
+        "advice": run.outcome.advice,
+        "strides": len(run.trajectory.crossings),
+        "duration": end.time - start.time,
+        "distance": distance,
+        "achieved_speed": distance / (end.time - start.time) if end.time > start.time else None,
+        "largest_deviation": max((row["deviation"] for row in rows), default=0.0),
+        "last_deviation": rows[-1]["deviation"] if rows else 0.0,
+    }
+    return {key: finite(value) for key, value in record.items()}
+
+
+def apex_table(run: SteeredRun, stabilizer: Stabilizer) -> list[dict[str, float]]:
+    """One row per apex: when and where, its coordinates, how far off they are, what was steered.
+
+    The height is that above the ground. ``deviation`` is the length of the vector of deviations
+    from the gait, in natural units.
+    """
+    model, gait = run.model, stabilizer.gait.model
+    rows = []
+    for number, (point, apex, inputs) in enumerate(
+        zip(run.section_points, run.apexes, run.inputs, strict=True)
+    ):
+        x = float(point.states[0])
+        if model.ground is not None:
+            apex = {**apex, "height": apex["height"] - model.ground.height(x)}
+        off = [(apex[name] - gait.apex[name]) / gait.scales[name] for name in apex]
+        rows.append(
+            {
+                "stride": number,
+                "time": point.time,
+                "com_x": x,
+                **apex,
+                "deviation": float(np.linalg.norm(off)),
+                **inputs,
+            }
+        )
+    return rows
