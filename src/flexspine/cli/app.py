@@ -25,6 +25,7 @@ from flexspine.cli import (
     presets,
     study,
     sweep,
+    terrain,
     trot,
     verify,
 )
@@ -61,6 +62,7 @@ app.command("rerun")(sweep.rerun)
 app.command("basin")(basin.basin)
 app.command("map")(gait_map.gait_map)
 app.command("control")(control.control)
+app.command("terrain")(terrain.terrain)
 app.command("trot")(trot.trot)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)

@@ -11,18 +11,16 @@ import numpy as np
 from flexspine.control.stabilize import Stabilizer
 from flexspine.control.steering import Noise, SteeredRun, steer
 from flexspine.errors import UnknownNameError
+from flexspine.hybrid.outcome import COMPLETED
 from flexspine.models import ground as grounds
 from flexspine.models.model import Model
-
-# What noise is made of: the same in every run of an animal, so that none of it is lost.
-NOISELESS = Noise()
 
 
 class Upset(NamedTuple):
     """What becomes of a model, and what noise there is."""
 
     model: Model
-    noise: Noise = NOISELESS
+    noise: Noise = Noise()
 
 
 # From a gait's model, size, where (0 to 1 of a stride), seed and length of a stride (m).
@@ -98,30 +96,29 @@ def disturbance(name: str) -> Disturbance:
 class Fate(NamedTuple):
     """What became of a run: strides and distance (m) to the end of it, and how it ended."""
 
-    size: float
-    where: float
     strides: int
     distance: float
     outcome: str
+
+    @classmethod
+    def of(cls, run: SteeredRun) -> Fate:
+        """What became of a run."""
+        start, end = run.trajectory.start.states[0], run.trajectory.end.states[0]
+        return cls(len(run.trajectory.crossings), float(end - start), run.outcome.name)
+
+    @property
+    def survived(self) -> bool:
+        """Whether it made all its strides."""
+        return self.outcome == COMPLETED.name
 
 
 def endure(
     stabilizer: Stabilizer, kind: Disturbance, size: float, where: float, seed: int, strides: int
 ) -> Fate:
     """Run a gait under feedback and a disturbance for so many strides, or until it fails."""
-    run = disturbed(stabilizer, kind, size, where, seed, strides)
-    start, end = run.trajectory.start.states[0], run.trajectory.end.states[0]
-    made = len(run.trajectory.crossings)
-    return Fate(size, where, made, float(end - start), run.outcome.name)
-
-
-def disturbed(
-    stabilizer: Stabilizer, kind: Disturbance, size: float, where: float, seed: int, strides: int
-) -> SteeredRun:
-    """The run itself."""
     gait = stabilizer.gait
     upset = kind.make(gait.model, size, where, seed, gait.stride_length)
-    return steer(upset.model, stabilizer, strides=strides, noise=upset.noise, seed=seed)
+    return Fate.of(steer(upset.model, stabilizer, strides=strides, noise=upset.noise, seed=seed))
 
 
 def draw(kind: Disturbance, largest: float, seed: int, number: int) -> tuple[float, float, int]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,16 @@ class Stabilizer(Steering):
     gains: tuple[Array, ...]
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """What it steers, around what, and its gains."""
+        return {
+            "inputs": list(self.inputs),
+            "usual": self.usual.tolist(),
+            "apexes": [part.apex.tolist() for part in self.parts],
+            "gains": [gain.tolist() for gain in self.gains],
+        }
+
+    @property
     def twice(self) -> bool:
         """Whether it acts between the stances too."""
         return len(self.parts) == 2
@@ -102,13 +112,14 @@ class Stabilizer(Steering):
         return _scales(self.gait.model, self.inputs)
 
     @cached_property
-    def _usual(self) -> Array:
+    def usual(self) -> Array:
+        """The inputs of the gait, shape (u,)."""
         return np.array([self.gait.model.numbers[name] for name in self.inputs])
 
     def _corrected(self, number: int, apex: Array) -> Array:
         states, inputs = self._scales
         off = (apex - self.parts[number].apex) / states
-        found: Array = self._usual - self.gains[number] @ off * inputs
+        found: Array = self.usual - self.gains[number] @ off * inputs
         return found
 
 

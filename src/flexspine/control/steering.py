@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -47,6 +48,11 @@ class Steering(ABC):
 
     inputs: tuple[str, ...]
 
+    @property
+    @abstractmethod
+    def settings(self) -> dict[str, Any]:
+        """All that decides what it does, for a file."""
+
     @abstractmethod
     def at_apex(self, apex: Array) -> Array:
         """The inputs (u,) for section coordinates (d,) at an apex after both stances.
@@ -65,6 +71,11 @@ class Fixed(Steering):
 
     inputs: tuple[str, ...]
     values: Array
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The inputs and their values."""
+        return dict(zip(self.inputs, self.values.tolist(), strict=True))
 
     def at_apex(self, apex: Array) -> Array:
         """The same as ever."""

@@ -36,6 +36,9 @@ DOTTED = 60
 # Below it a deviation is rounding.
 FLOOR = 1e-14
 
+# The largest deviation over the smallest from which on their scale is logarithmic.
+DECAYED = 100.0
+
 OTHER_COLORS = (GREEN, ORANGE, PURPLE, INK)
 
 
@@ -98,8 +101,13 @@ def _style(count: int) -> dict[str, Any]:
 
 
 def _draw_deviation(axes: Axes, columns: Mapping[str, Any]) -> None:
-    size = np.maximum(columns["deviation"], FLOOR)
-    axes.semilogy(columns["stride"], size, color=INK, **_style(len(size)))
+    size = np.where(columns["deviation"] > FLOOR, columns["deviation"], np.nan)
+    axes.plot(columns["stride"], size, color=INK, **_style(len(size)))
+    known = size[np.isfinite(size)]
+    if known.size and known.max() > DECAYED * known.min():
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0)
     axes.set_ylabel("deviation of\nthe apex (1)")
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from flexspine._version import __version__
 from flexspine.control.disturbance import disturbance, endure
 from flexspine.control.stabilize import Stabilizer, stabilize
 from flexspine.errors import FlexspineError, ParameterError
@@ -19,8 +18,7 @@ from flexspine.gaits.stability import floquet_multipliers
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.studies.following import Line, LostGaitError, carried
-from flexspine.workers.journal import Journal
-from flexspine.workers.local import LocalWorkers
+from flexspine.workers.lasting import do_all
 
 # Relative; limits are known to it, and are on the safe side.
 PRECISION = 0.1
@@ -98,8 +96,7 @@ def largest(stabilizer: Stabilizer, limit: Limit) -> float:
 
     def fine(size: float) -> bool:
         return all(
-            endure(stabilizer, kind, limit.sign * size, where, seed, limit.strides).strides
-            == limit.strides
+            endure(stabilizer, kind, limit.sign * size, where, seed, limit.strides).survived
             for where, seed in limit.tries
         )
 
@@ -152,28 +149,21 @@ def find_limits(
         for stiffness, speed, gait, reason in _gaits(model, stiffnesses, speeds)
         for design in designs
     ]
-    journal, done = None, dict[int, Cell]()
-    if store is not None:
-        header = {
-            "flexspine": __version__, "model": model.name, "numbers": model.numbers,
+    return do_all(
+        _examine_piece,
+        pieces,
+        processes=check_count("processes", processes),
+        progress=progress,
+        store=store,
+        description={
+            "model": model.name, "numbers": model.numbers,
             "stiffnesses": list(stiffnesses), "speeds": list(speeds),
             "designs": [list(design) for design in designs],
             "limits": [list(limit) for limit in limits],
-        }  # fmt: skip
-        journal = Journal(store, header, "limits", _is_line)
-        done = {line["piece"]: Cell(**line["cell"]) for line in journal.lines}
-
-    def jobs() -> Iterator[tuple[int, _Piece]]:
-        return ((k, piece) for k, piece in enumerate(pieces) if k not in done)
-
-    progress(len(done), len(pieces))
-    with LocalWorkers(check_count("processes", processes)) as crew:
-        for number, cell in crew.map(_examine_piece, jobs()):
-            done[number] = cell
-            if journal is not None:
-                journal.add({"piece": number, "cell": vars(cell)})
-            progress(len(done), len(pieces))
-    return [done[k] for k in range(len(pieces))]
+        },
+        to_json=vars,
+        from_json=lambda cell: Cell(**cell),
+    )  # fmt: skip
 
 
 def _gaits(
@@ -216,7 +206,3 @@ def _examine_piece(piece: _Piece) -> Cell:
         piece.stiffness, piece.speed, piece.design.name, radius, found.level_spectral_radius,
         limits, None,
     )  # fmt: skip
-
-
-def _is_line(line: Any) -> bool:
-    return isinstance(line, dict) and line.keys() >= {"piece", "cell"}

@@ -5,23 +5,25 @@ Every animal meets the same disturbances.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from functools import cached_property
+from itertools import pairwise
+from math import sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flexspine._version import __version__
 from flexspine.control.disturbance import Disturbance, Fate, disturbance, draw, endure
 from flexspine.control.stabilize import Stabilizer
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
+from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
-from flexspine.parameters import is_number, shortened, values
-from flexspine.workers.journal import Journal
-from flexspine.workers.local import LocalWorkers
+from flexspine.parameters import is_finite, shortened, values
+from flexspine.workers.lasting import do_all
 
 # Runs that are done, and kept, together: some seconds of work.
 CHUNK = 100
@@ -29,9 +31,8 @@ CHUNK = 100
 # Of the standard normal; 95 of 100 intervals hold the truth.
 QUANTILE = 1.959963984540054
 
+# To each side.
 BINS = 20
-
-COMPLETED = "completed"
 
 
 class Bin(NamedTuple):
@@ -50,63 +51,59 @@ class Bin(NamedTuple):
         return self.survived / self.runs if self.runs else float("nan")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Endurance:
-    """The runs of one animal."""
+    """The runs of one animal: ``sizes`` (runs,) of what disturbed them, and their fates."""
 
-    body: str
+    sizes: Array
     fates: tuple[Fate, ...]
-    strides: int
 
-    @property
-    def survived(self) -> Array:
+    @cached_property
+    def survived(self) -> NDArray[np.bool_]:
         """Which runs made all strides, shape (runs,)."""
-        return np.array([fate.outcome == COMPLETED for fate in self.fates], dtype=float)
-
-    @property
-    def sizes(self) -> Array:
-        """How large the disturbances were, shape (runs,)."""
-        return np.array([fate.size for fate in self.fates])
+        return np.array([fate.survived for fate in self.fates], dtype=bool)
 
     def safe(self, sign: int) -> float | None:
         """The size up to which every run survived, to one side; None if all did."""
-        failed = [abs(f.size) for f in self._side(sign) if f.outcome != COMPLETED]
-        below = [abs(f.size) for f in self._side(sign) if abs(f.size) < min(failed, default=0)]
-        return max(below, default=0.0) if failed else None
+        sizes, fine = self._side(sign)
+        if fine.all():
+            return None
+        return float(sizes[sizes < sizes[~fine].min()].max(initial=0.0))
 
-    def half(self, sign: int) -> float | None:
+    def typical(self, sign: int) -> float | None:
         """The size that tells best who survives from who does not, to one side; None if all do.
 
-        As many smaller ones failed and larger ones survived as need be: their sum is least.
+        As many runs as can be survived below it and failed above it.
         """
-        runs = sorted(self._side(sign), key=lambda fate: abs(fate.size))
-        if all(fate.outcome == COMPLETED for fate in runs):
+        sizes, fine = self._side(sign)
+        if fine.all():
             return None
-        fine = np.array([fate.outcome == COMPLETED for fate in runs])
-        wrong = np.cumsum(np.append(0, ~fine)) + fine.sum() - np.cumsum(np.append(0, fine))
-        best = int(np.argmin(wrong))
-        sizes = [0.0, *(abs(fate.size) for fate in runs)]
-        return sizes[best]
+        order = np.argsort(sizes)
+        fine = fine[order]
+        right = np.append(0, np.cumsum(fine)) + np.append(np.cumsum(~fine[::-1])[::-1], 0)
+        return float(np.append(0.0, sizes[order])[int(np.argmax(right))])
 
     def outcomes(self, sign: int) -> dict[str, int]:
         """How many runs ended how, to one side."""
-        names = [fate.outcome for fate in self._side(sign)]
+        names = [
+            f.outcome for f, size in zip(self.fates, self.sizes, strict=True) if size * sign >= 0
+        ]
         return {name: names.count(name) for name in sorted(set(names))}
 
-    def bins(self, largest: float, signed: bool) -> list[Bin]:
-        """Survival by size."""
-        edges = np.linspace(-largest if signed else 0.0, largest, BINS * (1 + signed) + 1)
+    def bins(self, edges: Array) -> list[Bin]:
+        """Survival by size, between ``edges`` (bins + 1,)."""
         place = np.clip(np.searchsorted(edges, self.sizes, side="right") - 1, 0, len(edges) - 2)
         found = []
-        for k in range(len(edges) - 1):
+        for k, (low, high) in enumerate(pairwise(edges.tolist())):
             here = self.survived[place == k]
             count, fine = len(here), int(here.sum())
-            least, most = wilson(fine, count)
-            found.append(Bin(float(edges[k]), float(edges[k + 1]), count, fine, least, most))
+            found.append(Bin(low, high, count, fine, *wilson(fine, count)))
         return found
 
-    def _side(self, sign: int) -> list[Fate]:
-        return [fate for fate in self.fates if fate.size * sign >= 0]
+    def _side(self, sign: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Sizes to one side, without sign, and who survived them."""
+        here = self.sizes * sign >= 0
+        return np.abs(self.sizes[here]), self.survived[here]
 
 
 def wilson(survived: int, runs: int) -> tuple[float, float]:
@@ -119,7 +116,7 @@ def wilson(survived: int, runs: int) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robustness:
     """What animals survive of one kind of disturbance up to ``largest``."""
 
@@ -127,11 +124,22 @@ class Robustness:
     largest: float
     strides: int
     seed: int
-    bodies: Mapping[str, Endurance]
+    animals: Mapping[str, Endurance]
+
+    @property
+    def signs(self) -> dict[str, int]:
+        """The sides to which it may disturb."""
+        return {"positive": 1, "negative": -1} if self.kind.signed else {"positive": 1}
+
+    @property
+    def edges(self) -> Array:
+        """Of bins of size, shape (bins + 1,)."""
+        low = -self.largest if self.kind.signed else 0.0
+        return np.linspace(low, self.largest, BINS * len(self.signs) + 1)
 
 
 class _Piece(NamedTuple):
-    body: str
+    animal: str
     stabilizer: Stabilizer
     kind: str
     largest: float
@@ -158,11 +166,11 @@ def survive(
     ``kind`` is push, step, rough, blocks, acting or sensing; sizes are drawn evenly up to
     ``largest``, to both sides where there are two. ``store`` is a file that keeps what is done;
     the same call goes on from there. ``processes`` share the work without a change to results.
-    Raises `UnknownNameError`, `ParameterError` and `OutputError`.
+    ``progress`` is told runs. Raises `UnknownNameError`, `ParameterError` and `OutputError`.
     """
     what = disturbance(kind)
     largest = what.largest if largest is None else largest
-    if not (is_number(largest) and isfinite(largest) and largest > 0):
+    if not (is_finite(largest) and largest > 0):
         raise ParameterError(
             f"largest = {shortened(largest)} is not usable", "give a number above zero"
         )
@@ -171,41 +179,50 @@ def survive(
     check_count("runs", runs)
     check_count("strides", strides)
     pieces = [
-        _Piece(
-            body, stabilizer, kind, largest, strides, seed, first, min(CHUNK, runs - first)
-        )
+        _Piece(name, stabilizer, kind, largest, strides, seed, first, min(CHUNK, runs - first))
         for first in range(0, runs, CHUNK)
-        for body, stabilizer in animals.items()
-    ]  # fmt: skip
-    journal = None
-    done: dict[int, list[Fate]] = {}
-    if store is not None:
-        setting = {"kind": kind, "largest": largest, "runs": runs, "strides": strides, "seed": seed}
-        about = {name: _about(stabilizer) for name, stabilizer in animals.items()}
-        header = {"flexspine": __version__, **setting, "animals": about}
-        journal = Journal(store, header, "runs", _is_line)
-        done = {line["piece"]: [Fate(*fate) for fate in line["fates"]] for line in journal.lines}
-
-    def jobs() -> Iterator[tuple[int, _Piece]]:
-        return ((k, piece) for k, piece in enumerate(pieces) if k not in done)
-
+        for name, stabilizer in animals.items()
+    ]
     whole = runs * len(animals)
-    progress(sum(map(len, done.values())), whole)
-    with LocalWorkers(check_count("processes", processes)) as crew:
-        for number, fates in crew.map(_run_piece, jobs()):
-            done[number] = fates
-            if journal is not None:
-                journal.add({"piece": number, "fates": [list(fate) for fate in fates]})
-            progress(sum(map(len, done.values())), whole)
-    bodies = {
-        body: Endurance(
-            body,
-            tuple(f for k, piece in enumerate(pieces) if piece.body == body for f in done[k]),
-            strides,
+    done = do_all(
+        _run_piece,
+        pieces,
+        processes=check_count("processes", processes),
+        progress=lambda count, of: progress(whole * count // of, whole),
+        store=store,
+        description={
+            "kind": kind, "largest": largest, "runs": runs, "strides": strides, "seed": seed,
+            "animals": {
+                name: {**about(each.gait.model), **each.settings} for name, each in animals.items()
+            },
+        },
+        to_json=list,
+        from_json=lambda rows: [Fate(*row) for row in rows],
+    )  # fmt: skip
+    sizes = np.array([draw(what, largest, seed, k)[0] for k in range(runs)])
+    found = {
+        name: Endurance(
+            sizes,
+            tuple(
+                fate
+                for piece, fates in zip(pieces, done, strict=True)
+                if piece.animal == name
+                for fate in fates
+            ),
         )
-        for body in animals
+        for name in animals
     }
-    return Robustness(what, largest, strides, seed, bodies)
+    return Robustness(what, largest, strides, seed, found)
+
+
+def about(model: Model) -> dict[str, Any]:
+    """All that decides what a model does."""
+    return {
+        "model": model.kind.name,
+        "parameters": values(model.parameters),
+        "apex": dict(model.apex),
+        "touchdown": dict(model.touchdown),
+    }
 
 
 def _run_piece(piece: _Piece) -> list[Fate]:
@@ -214,21 +231,3 @@ def _run_piece(piece: _Piece) -> list[Fate]:
         endure(piece.stabilizer, kind, *draw(kind, piece.largest, piece.seed, k), piece.strides)
         for k in range(piece.first, piece.first + piece.runs)
     ]
-
-
-def _about(stabilizer: Stabilizer) -> dict[str, Any]:
-    """All that decides what an animal does."""
-    model = stabilizer.gait.model
-    return {
-        "model": model.kind.name,
-        "parameters": values(model.parameters),
-        "apex": dict(model.apex),
-        "touchdown": dict(model.touchdown),
-        "tolerance": stabilizer.gait.tolerance,
-        "inputs": list(stabilizer.inputs),
-        "gains": [gain.tolist() for gain in stabilizer.gains],
-    }
-
-
-def _is_line(line: Any) -> bool:
-    return isinstance(line, dict) and line.keys() >= {"piece", "fates"}

@@ -1,0 +1,206 @@
+"""``flexspine terrain``: run over ground that is not flat, once or many times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flexspine.cli.control import report
+from flexspine.cli.interrupts import interruptible
+from flexspine.cli.options import (
+    Animation,
+    Assignments,
+    GaitFile,
+    Json,
+    Preset,
+    RunDirectory,
+    numbers,
+)
+from flexspine.cli.output import counting, print_json, steps
+from flexspine.cli.starts import starting_gait
+from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
+from flexspine.cli.sweep import Processes, count_of, unfinished_is_kept
+from flexspine.errors import InputError
+
+if TYPE_CHECKING:
+    from flexspine.control.steering import SteeredRun
+    from flexspine.studies.wayfaring import Wayfaring
+
+UNFINISHED = "terrain.unfinished.jsonl"
+
+# More strides than this are not recorded: gigabytes, and nobody looks at them.
+RECORDED = 200
+
+
+def terrain(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND",
+            help="step, stairs, ramp, slope, waves, rough, blocks, or a CSV file with columns x, y "
+            "in m.",
+        ),
+    ] = "rough",
+    with_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="NAME=VALUE",
+            help="A number of the ground: height, length, count, degrees, amplitude, wavelength, "
+            "spacing (m; degrees of a slope).",
+        ),
+    ] = None,
+    preset: Preset = None,
+    gait: GaitFile = None,
+    set_: Assignments = None,
+    passive: Annotated[
+        bool, typer.Option("--passive", help="Run with fixed touchdown angles, without feedback.")
+    ] = False,
+    steer: Steer = None,
+    method: Method = "lqr",
+    once: Once = False,
+    effort: Effort = None,
+    strides: Annotated[int, typer.Option(min=1, help="How many strides to run at most.")] = 50,
+    runs: Annotated[
+        int, typer.Option(min=1, help="How many runs, each over ground of another seed.")
+    ] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Draws the heights, and where in a stride the ground begins.")
+    ] = 0,
+    processes: Processes = None,
+    out: RunDirectory = None,
+    animation: Animation = True,
+    json: Json = False,
+) -> int:
+    """Run a stabilised gait over ground that is not flat, and tell how far it comes.
+
+    The feedback is that of 'flexspine control'; heights are measured from the ground below the
+    CoM. Legs keep their length in the air, so that whether a toe clears a face depends on where in
+    the stride it stands. With --runs, distances to the first fall are told; interrupted, the same
+    command goes on. Units are SI and radians but for a slope's degrees. Exit code 0: all strides
+    done, or all of --runs; 1: it fell or stumbled; 2: bad input; 3: the machine failed;
+    130: interrupted.
+
+    Examples:
+        flexspine terrain rough --with height=0.008 --out results
+
+        flexspine terrain step --with height=-0.03 --passive
+
+        flexspine terrain waves --with amplitude=0.01 --with wavelength=2 --runs 200 --out results
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.control.steered_record import steered_record
+    from flexspine.control.steering import Fixed, Steering
+    from flexspine.studies.wayfaring import Terrain, distance_to_fall, walk_over
+
+    interruptible()
+    if passive and (steer or once or effort is not None or method != "lqr"):
+        raise InputError(
+            "--passive is given, and how to steer too", "leave --steer, --method, --once, --effort"
+        )
+    where = Terrain(kind, numbers("--with", with_))
+    with ExitStack() as stack:
+        progress = stack.enter_context(steps())
+        start = starting_gait(gait, preset, set_, None, progress)
+        where.ground(seed, start.stride_length, strides)  # refused before anything is done
+        progress.begin("designing the feedback")
+        found = stabilizer_of(start, steer, method, once, effort)
+        steering: Steering = Fixed(found.inputs, found.usual) if passive else found
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        progress.begin("running")
+        run = walk_over(
+            start.model, steering, where, stride=start.stride_length, strides=strides, seed=seed,
+            record=directory is not None and strides <= RECORDED,
+        )  # fmt: skip
+        record = {**steered_record(run, found), "passive": passive}
+        if runs > 1:
+            many = stack.enter_context(_kept(out))
+            with counting("runs") as count:
+                ensemble = distance_to_fall(
+                    start.model, steering, where, stride=start.stride_length, strides=strides,
+                    runs=runs, seed=seed, processes=count_of(processes), store=many,
+                    progress=count,
+                )  # fmt: skip
+            record["ensemble"] = _ensemble_record(ensemble)
+        if directory is not None:
+            with directory.stage_run(run, record, animation, progress) as stage:
+                _write_ground(run, stage)
+                if runs > 1:
+                    _write_ensemble(ensemble, record, stage)
+    if json:
+        print_json(record)
+    else:
+        print(_report(record))
+        if out is not None:
+            print(f"results in {out}")
+    return 0 if runs > 1 or run.outcome.completed else 1
+
+
+@contextmanager
+def _kept(out: Path | None) -> Iterator[Path | None]:
+    """A file for what is done of many runs, which goes when all is."""
+    if out is None:
+        yield None
+        return
+    with unfinished_is_kept(out):
+        yield out / UNFINISHED
+    (out / UNFINISHED).unlink(missing_ok=True)
+
+
+def _ensemble_record(found: Wayfaring) -> dict[str, Any]:
+    return {
+        "runs": len(found.fates),
+        "strides": found.strides,
+        "first_seed": found.first_seed,
+        "outcomes": found.outcomes,
+        "arrived": found.arrived,
+        "metres_per_fall": found.metres_per_fall(),
+        "distance_to_first_fall": {
+            f"{share:.0%}": found.quantile(share) for share in (0.1, 0.5, 0.9)
+        },
+    }
+
+
+def _write_ground(run: SteeredRun, stage: Path) -> None:
+    from flexspine.models.dataset import VICINITY
+    from flexspine.studies.tables import write_table
+
+    assert run.model.ground is not None
+    ends = [float(point.states[0]) for point in (run.trajectory.start, run.trajectory.end)]
+    outline = run.model.ground.outline(min(ends) - VICINITY, max(ends) + VICINITY)
+    write_table([{"x": x, "y": y} for x, y in outline.tolist()], stage / "ground.csv")
+
+
+def _write_ensemble(found: Wayfaring, record: dict[str, Any], stage: Path) -> None:
+    from flexspine.report.distance_figure import plot_distances
+    from flexspine.studies.tables import write_table
+
+    rows = [
+        {"seed": found.first_seed + number, **fate._asdict()}
+        for number, fate in enumerate(found.fates)
+    ]
+    write_table(rows, stage / "runs.csv")
+    plot_distances(found, record).savefig(stage / "distances.png")
+
+
+def _report(record: dict[str, Any]) -> str:
+    """The run, and many more, in a few lines for a person."""
+    lines = [report(record)]
+    if record["passive"]:
+        lines = [line for line in report(record).splitlines() if "steered" not in line]
+        lines = [line for line in lines if "spectral radius" not in line]
+        lines.insert(1, "  steered          nothing: fixed touchdown angles")
+    many = record.get("ensemble")
+    if many:
+        ended = ", ".join(f"{count} {name}" for name, count in many["outcomes"].items())
+        lines.append(f"{many['runs']} runs of up to {many['strides']} strides: {ended}")
+        for share, distance in many["distance_to_first_fall"].items():
+            if distance is not None:
+                lines.append(f"  {share:>3} had ended    after {distance:.1f} m")
+        if many["metres_per_fall"] is not None:
+            lines.append(f"  metres per fall  {many['metres_per_fall']:.1f}")
+    return "\n".join(lines)

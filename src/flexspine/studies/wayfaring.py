@@ -1,0 +1,187 @@
+"""How far a steered animal gets over ground that is not flat, before it falls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexspine.control.disturbance import Fate
+from flexspine.control.steering import SteeredRun, Steering, steer
+from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.hybrid.compile import Array
+from flexspine.models import ground as grounds
+from flexspine.models.ground import Ground, read_ground
+from flexspine.models.model import Model
+from flexspine.models.simulation import check_count
+from flexspine.studies.robustness import about
+from flexspine.workers.lasting import do_all
+
+# Runs that are done, and kept, together.
+CHUNK = 20
+
+# Ground is made so much longer than an undisturbed run, for those that get faster.
+RESERVE = 1.5
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """A kind of ground with its numbers, from which ground is made for each seed.
+
+    ``kind`` is step, stairs, ramp, slope, waves, rough, blocks or the path of a CSV file. The seed
+    draws what is random, and where within a stride it begins; that of a file is its own.
+    """
+
+    kind: str
+    numbers: Mapping[str, float]
+
+    def ground(self, seed: int, stride: float, strides: int) -> Ground:
+        """The ground for a seed, strides of ``stride`` m. Raises `InputError`."""
+        if self.kind.endswith(".csv"):
+            if self.numbers:
+                raise ParameterError("ground from a file has no numbers", "leave them away")
+            return read_ground(self.kind)
+        if self.kind not in KINDS:
+            raise UnknownNameError("kind of ground", self.kind, KINDS)
+        make, known = KINDS[self.kind]
+        for name in self.numbers:
+            if name not in known:
+                raise UnknownNameError(f"number of '{self.kind}'", name, known)
+        given: dict[str, Any] = {**known, **self.numbers}
+        if self.kind in RANDOM:
+            given |= {"length": RESERVE * stride * strides + grounds.BEGINS, "seed": seed}
+        where = float(np.random.default_rng(seed).uniform())
+        return make(**given, at=grounds.BEGINS + where * stride)
+
+
+# How each kind is made, and its numbers where none are given.
+KINDS: Mapping[str, tuple[Callable[..., Ground], Mapping[str, float]]] = {
+    "step": (grounds.step, {"height": -0.01}),
+    "stairs": (grounds.stairs, {"height": -0.01, "length": 2.0, "count": 5}),
+    "ramp": (grounds.ramp, {"height": 0.02, "length": 5.0}),
+    "slope": (grounds.slope, {"degrees": -0.3}),
+    "waves": (grounds.waves, {"amplitude": 0.005, "wavelength": 1.0}),
+    "rough": (grounds.rough, {"height": 0.005, "spacing": 0.3}),
+    "blocks": (grounds.blocks, {"height": 0.002, "spacing": 0.3}),
+}
+RANDOM = ("rough", "blocks")
+
+
+@dataclass(frozen=True)
+class Wayfaring:
+    """Many runs over ground of one kind, each of its own seed."""
+
+    terrain: Terrain
+    strides: int
+    first_seed: int
+    fates: tuple[Fate, ...]
+
+    @property
+    def distances(self) -> Array:
+        """How far each run came, in m, shape (runs,)."""
+        return np.array([fate.distance for fate in self.fates])
+
+    @property
+    def arrived(self) -> int:
+        """How many made all strides."""
+        return sum(fate.survived for fate in self.fates)
+
+    @property
+    def outcomes(self) -> dict[str, int]:
+        """How many ended how."""
+        names = [fate.outcome for fate in self.fates]
+        return {name: names.count(name) for name in sorted(set(names))}
+
+    def quantile(self, share: float) -> float | None:
+        """The distance (m) before which this share of all runs ended; None if fewer ended."""
+        ended = sorted(f.distance for f in self.fates if not f.survived)
+        needed = int(np.ceil(share * len(self.fates)))
+        return ended[needed - 1] if 0 < needed <= len(ended) else None
+
+    def metres_per_fall(self) -> float | None:
+        """All distance over all falls, in m; None without a fall."""
+        falls = len(self.fates) - self.arrived
+        return float(self.distances.sum()) / falls if falls else None
+
+
+class _Piece(NamedTuple):
+    model: Model
+    steering: Steering
+    terrain: Terrain
+    stride: float
+    strides: int
+    seeds: tuple[int, ...]
+
+
+def walk_over(
+    model: Model,
+    steering: Steering,
+    terrain: Terrain,
+    *,
+    stride: float,
+    strides: int,
+    seed: int = 0,
+    record: bool = False,
+) -> SteeredRun:
+    """Run over ground of a seed; ``stride`` is the length (m) of an undisturbed one."""
+    ground = terrain.ground(seed, stride, strides)
+    return steer(model.on(ground), steering, strides=strides, seed=seed, record=record)
+
+
+def distance_to_fall(
+    model: Model,
+    steering: Steering,
+    terrain: Terrain,
+    *,
+    stride: float,
+    strides: int = 200,
+    runs: int = 100,
+    seed: int = 0,
+    processes: int = 1,
+    store: Path | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+) -> Wayfaring:
+    """Run ``runs`` times over ground of seeds ``seed``, ``seed + 1``, ... for up to ``strides``.
+
+    ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
+    share the work without a change to results. Raises `InputError`.
+    """
+    check_count("runs", runs)
+    check_count("strides", strides)
+    terrain.ground(seed, stride, strides)  # refused before anything is done
+    pieces = [
+        _Piece(
+            model, steering, terrain, stride, strides,
+            tuple(range(seed + first, seed + min(first + CHUNK, runs))),
+        )
+        for first in range(0, runs, CHUNK)
+    ]  # fmt: skip
+    done = do_all(
+        _run_piece,
+        pieces,
+        processes=check_count("processes", processes),
+        progress=lambda count, of: progress(runs * count // of, runs),
+        store=store,
+        description={
+            "kind": terrain.kind, "numbers": dict(terrain.numbers), "runs": runs,
+            "strides": strides, "seed": seed, "animal": {**about(model), **steering.settings},
+        },
+        to_json=list,
+        from_json=lambda rows: [Fate(*row) for row in rows],
+    )  # fmt: skip
+    return Wayfaring(terrain, strides, seed, tuple(fate for fates in done for fate in fates))
+
+
+def _run_piece(piece: _Piece) -> list[Fate]:
+    return [
+        Fate.of(
+            walk_over(
+                piece.model, piece.steering, piece.terrain,
+                stride=piece.stride, strides=piece.strides, seed=seed,
+            )
+        )
+        for seed in piece.seeds
+    ]  # fmt: skip
