@@ -23,6 +23,7 @@ from flexspine.cli import (
     gait,
     gait_map,
     presets,
+    robustness,
     study,
     sweep,
     terrain,
@@ -63,6 +64,7 @@ app.command("basin")(basin.basin)
 app.command("map")(gait_map.gait_map)
 app.command("control")(control.control)
 app.command("terrain")(terrain.terrain)
+app.command("robustness")(robustness.robustness)
 app.command("trot")(trot.trot)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)

@@ -136,10 +136,10 @@ def study_spines(
         return trace_branch(gait, over, bounds=bounds, longest_step=STEP, store=file)
 
     specimens = [
-        Specimen(body, None, trace(_start(body, setting), "mean_speed", setting.speeds, body))
+        Specimen(body, None, trace(gait_of(body, setting), "mean_speed", setting.speeds, body))
         for body in (RIGID, LOCKED)
     ]
-    flexible = _start(FLEXIBLE, setting)
+    flexible = gait_of(FLEXIBLE, setting)
     own = flexible.model.parameter_vector[flexible.model.parameter_names.index("spine.stiffness")]
     low, high = min(*setting.stiffnesses, own), max(*setting.stiffnesses, own)
     across = (
@@ -190,7 +190,7 @@ def _check(setting: Setting) -> None:
         )
 
 
-def _start(body: str, setting: Setting) -> Gait:
+def gait_of(body: str, setting: Setting) -> Gait:
     """The preset's gait, carried over to the energy, the height and the speeds of the setting."""
     gait = examine(load_model(PRESETS[body]))
     for over, low, high in (

@@ -1,0 +1,210 @@
+"""``flexspine robustness``: what rigid, locked and flexible bodies survive under one controller."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.options import Json
+from flexspine.cli.output import counting, print_json, steps
+from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
+from flexspine.cli.sweep import Processes, count_of, unfinished_is_kept
+from flexspine.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from flexspine.control.stabilize import Stabilizer
+    from flexspine.studies.robustness import Endurance, Robustness
+
+UNFINISHED = "{}.unfinished.jsonl"
+
+
+def robustness(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND", help="push, step, rough, blocks, acting or sensing (noise)."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Write runs, figure and summary into this directory.")
+    ] = None,
+    body: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="published-rigid, locked-spine or flexible; repeat it (default: all three)."
+        ),
+    ] = None,
+    gait: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE", help="A gait saved by 'flexspine gait --out' instead; repeat it."
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="Mean speed of the bodies' gaits, in m/s.")] = 4.5,
+    runs: Annotated[int, typer.Option(min=1, help="How many runs of each.")] = 10_000,
+    strides: Annotated[
+        int, typer.Option(min=1, help="How many strides a run has to make to survive.")
+    ] = 50,
+    largest: Annotated[
+        float | None,
+        typer.Option(
+            help="The largest disturbance, drawn evenly up to it (default: push 20 N s, step "
+            "0.06 m, rough 0.03 m, blocks 0.02 m, noise 0.03)."
+        ),
+    ] = None,
+    steer: Steer = None,
+    method: Method = "lqr",
+    once: Once = False,
+    effort: Effort = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the disturbances.")] = 0,
+    processes: Processes = None,
+    json: Json = False,
+) -> int:
+    """Disturb stabilised gaits thousands of times at random, and tell what they survive.
+
+    Gaits have the energy and apex height of the published ones; feedback is designed for each by
+    the same rule, and each meets the same disturbances: a push forward or backward at an apex
+    (N s), a step up or down anywhere in a stride, rough ground, or noise. Interrupted, the same
+    command goes on. Units are SI. Exit code 0: done; 1: a body has no gait there, or none that can
+    be stabilised; 2: bad input; 3: the machine failed; 130: interrupted.
+
+    Examples:
+        flexspine robustness step --out results/step
+
+        flexspine robustness push --runs 1000 --body flexible --body locked-spine --json
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.control.disturbance import disturbance
+    from flexspine.studies.robustness import survive
+
+    if body and gait:
+        raise InputError("--body and --gait are both given", "leave one of them")
+    disturbance(kind)  # refused before anything is done
+    with ExitStack() as stack:
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        store = None
+        if out is not None:
+            stack.enter_context(unfinished_is_kept(out))
+            store = out / UNFINISHED.format(kind)
+        with steps() as progress:
+            progress.begin("looking for gaits")
+            animals = {
+                name: stabilizer_of(found, steer, method, once, effort)
+                for name, found in _gaits(body, gait, speed).items()
+            }
+        with counting("runs") as count:
+            found = survive(
+                animals, kind, largest=largest, runs=runs, strides=strides, seed=seed,
+                processes=count_of(processes), store=store, progress=count,
+            )  # fmt: skip
+        record = _record(found, animals)
+        if directory is not None and store is not None:
+            with directory.stage() as stage:
+                _write(stage, found, record)
+            store.unlink()
+    if json:
+        print_json(record)
+    else:
+        print(_report(record))
+        if out is not None:
+            print(f"results in {out}")
+    return 0
+
+
+def _gaits(bodies: list[str] | None, files: list[Path] | None, speed: float) -> dict[str, Any]:
+    from flexspine.gaits.files import load_gait
+    from flexspine.studies.spines import PRESETS, Setting, gait_of
+
+    if files:
+        found = {}
+        for file in files:
+            found[file.stem] = load_gait(file)
+            if found[file.stem].flaw is not None:
+                raise InputError(f"'{file}' holds no gait: {found[file.stem].flaw}", "give others")
+        return found
+    known = {name.replace(" ", "-"): name for name in PRESETS}
+    for name in bodies or []:
+        if name not in known:
+            raise UnknownNameError("body", name, known)
+    setting = Setting(speeds=(speed, speed))
+    return {name: gait_of(known[name], setting) for name in bodies or known}
+
+
+def _record(found: Robustness, animals: dict[str, Stabilizer]) -> dict[str, Any]:
+    from flexspine.control.steered_record import stabilizer_record
+
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "flexspine": __version__,
+        "disturbance": found.kind.name,
+        "about": found.kind.about,
+        "unit": found.kind.unit,
+        "largest": found.largest,
+        "strides": found.strides,
+        "seed": found.seed,
+        "animals": {
+            name: {**stabilizer_record(animals[name]), **_survival(found, each)}
+            for name, each in found.animals.items()
+        },
+    }
+
+
+def _survival(found: Robustness, each: Endurance) -> dict[str, Any]:
+    return {
+        "runs": len(each.fates),
+        "survived": int(each.survived.sum()),
+        **{
+            side: {
+                "all_survived_up_to": each.safe(sign),
+                "typically_survived_up_to": each.typical(sign),
+                "outcomes": each.outcomes(sign),
+            }
+            for side, sign in found.signs.items()
+        },
+        "bins": [{**one._asdict(), "share": one.share} for one in each.bins(found.edges)],
+    }
+
+
+def _write(stage: Path, found: Robustness, record: dict[str, Any]) -> None:
+    from flexspine.cli.results import write_json
+    from flexspine.report.robustness_figure import plot_robustness
+    from flexspine.studies.tables import write_table
+
+    name = found.kind.name
+    write_json(record, stage / f"{name}.json")
+    rows = [
+        {"animal": animal, "run": number, "size": size, **fate._asdict()}
+        for animal, each in found.animals.items()
+        for number, (size, fate) in enumerate(zip(each.sizes.tolist(), each.fates, strict=True))
+    ]
+    write_table(rows, stage / f"{name}.parquet")
+    plot_robustness(found).savefig(stage / f"{name}.png")
+
+
+def _report(record: dict[str, Any]) -> str:
+    """What each animal survives, for a person."""
+    unit = "" if record["unit"] == "1" else f" {record['unit']}"
+    lines = [
+        f"{record['about']}, up to {record['largest']:g}{unit}; survived: {record['strides']} "
+        "strides made"
+    ]
+    for name, each in record["animals"].items():
+        lines.append(f"{name}: {each['survived']} of {each['runs']} runs survived")
+        for side in ("positive", "negative"):
+            if side in each:
+                lines.append(f"  {side:<9} {_limits(each[side], unit)}")
+    return "\n".join(lines)
+
+
+def _limits(side: dict[str, Any], unit: str) -> str:
+    ended = ", ".join(f"{count} {name}" for name, count in side["outcomes"].items())
+    if side["all_survived_up_to"] is None:
+        return f"all survived ({ended})"
+    return (
+        f"all up to {side['all_survived_up_to']:.3g}{unit}, "
+        f"typically up to {side['typically_survived_up_to']:.3g}{unit} ({ended})"
+    )
