@@ -22,6 +22,7 @@ from flexspine.cli import (
     forces,
     gait,
     gait_map,
+    limits,
     presets,
     robustness,
     study,
@@ -65,6 +66,7 @@ app.command("map")(gait_map.gait_map)
 app.command("control")(control.control)
 app.command("terrain")(terrain.terrain)
 app.command("robustness")(robustness.robustness)
+app.command("limits")(limits.limits)
 app.command("trot")(trot.trot)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
