@@ -36,7 +36,7 @@ def plot_robustness(found: Robustness) -> Figure:
             color, marker = COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)]
             bins = [one for one in each.bins(found.edges) if one.runs]
             middle = factor * np.array([(one.low + one.high) / 2 for one in bins])
-            share = 100 * np.array([one.share for one in bins])
+            share = 100 * np.array([one.survived / one.runs for one in bins])
             least, most = (
                 100 * np.array([getattr(one, n) for one in bins]) for n in ("least", "most")
             )

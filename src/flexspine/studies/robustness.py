@@ -46,9 +46,9 @@ class Bin(NamedTuple):
     most: float
 
     @property
-    def share(self) -> float:
-        """Which share survived."""
-        return self.survived / self.runs if self.runs else float("nan")
+    def share(self) -> float | None:
+        """Which share survived; None of no runs."""
+        return self.survived / self.runs if self.runs else None
 
 
 @dataclass(frozen=True, eq=False)
