@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from flexspine.control.distribution import Aim, ForceFamily, force_family
     from flexspine.control.leg_function import standing
     from flexspine.control.spine_comparison import SpineComparison, compare_spines
+    from flexspine.control.stabilize import Stabilizer, stabilize
+    from flexspine.control.steering import Noise, SteeredRun, steer
     from flexspine.control.trot import Trot, trot
     from flexspine.control.walk_measures import WalkSummary, summarize_walk
     from flexspine.control.walk_plan import Pace
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from flexspine.gaits.stability import Stability, floquet_multipliers
     from flexspine.gaits.switching import switch_branch
     from flexspine.models.dataset import to_dataset
+    from flexspine.models.ground import Ground
     from flexspine.models.many import Ensemble, simulate_many, stream_many
     from flexspine.models.model import Model
     from flexspine.models.presets import load_model, preset_names
@@ -42,12 +45,16 @@ if TYPE_CHECKING:
     from flexspine.report.map_figure import plot_map
     from flexspine.report.pinned_figure import plot_pinned
     from flexspine.report.robot_figure import plot_robot
+    from flexspine.report.robustness_figure import plot_robustness
     from flexspine.studies.basin import Basin, basin_plan, read_basins
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
+    from flexspine.studies.limits import find_limits
     from flexspine.studies.pinned_check import PinnedCheck, check_pinned
     from flexspine.studies.plan import Plan
     from flexspine.studies.plan_file import read_plan
+    from flexspine.studies.robustness import survive
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
+    from flexspine.studies.wayfaring import Terrain, distance_to_fall
 
 _HOMES = {
     "Aim": "control.distribution",
@@ -59,10 +66,12 @@ _HOMES = {
     "ForceFamily": "control.distribution",
     "Gait": "gaits.gait",
     "GaitMap": "studies.gait_map",
+    "Ground": "models.ground",
     "InputError": "errors",
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
     "Model": "models.model",
+    "Noise": "control.steering",
     "Pace": "control.walk_plan",
     "PinnedCheck": "studies.pinned_check",
     "Plan": "studies.plan",
@@ -74,15 +83,20 @@ _HOMES = {
     "Search": "gaits.search",
     "SpineComparison": "control.spine_comparison",
     "Stability": "gaits.stability",
+    "Stabilizer": "control.stabilize",
+    "SteeredRun": "control.steering",
     "Sweep": "studies.sweep",
+    "Terrain": "studies.wayfaring",
     "Trot": "control.trot",
     "WalkSummary": "control.walk_measures",
     "animate": "report.animation",
     "basin_plan": "studies.basin",
     "check_pinned": "studies.pinned_check",
     "compare_spines": "control.spine_comparison",
+    "distance_to_fall": "studies.wayfaring",
     "examine": "gaits.gait",
     "find_gaits": "gaits.search",
+    "find_limits": "studies.limits",
     "floquet_multipliers": "gaits.stability",
     "force_family": "control.distribution",
     "load_gait": "gaits.files",
@@ -94,6 +108,7 @@ _HOMES = {
     "plot_map": "report.map_figure",
     "plot_pinned": "report.pinned_figure",
     "plot_robot": "report.robot_figure",
+    "plot_robustness": "report.robustness_figure",
     "plot_run": "report.figure",
     "preset_names": "models.presets",
     "read_basins": "studies.basin",
@@ -106,12 +121,15 @@ _HOMES = {
     "save_gait": "gaits.files",
     "simulate": "models.simulation",
     "simulate_many": "models.many",
+    "stabilize": "control.stabilize",
     "standing": "control.leg_function",
+    "steer": "control.steering",
     "stream_many": "models.many",
     "stride_map": "gaits.return_map",
     "strip": "report.animation",
     "summarize": "gaits.measures",
     "summarize_walk": "control.walk_measures",
+    "survive": "studies.robustness",
     "sweep": "studies.sweep",
     "switch_branch": "gaits.switching",
     "to_dataset": "models.dataset",
@@ -129,10 +147,12 @@ __all__ = [
     "ForceFamily",
     "Gait",
     "GaitMap",
+    "Ground",
     "InputError",
     "Landmark",
     "MachineError",
     "Model",
+    "Noise",
     "Pace",
     "PinnedCheck",
     "Plan",
@@ -144,7 +164,10 @@ __all__ = [
     "Search",
     "SpineComparison",
     "Stability",
+    "Stabilizer",
+    "SteeredRun",
     "Sweep",
+    "Terrain",
     "Trot",
     "WalkSummary",
     "__version__",
@@ -152,8 +175,10 @@ __all__ = [
     "basin_plan",
     "check_pinned",
     "compare_spines",
+    "distance_to_fall",
     "examine",
     "find_gaits",
+    "find_limits",
     "floquet_multipliers",
     "force_family",
     "load_gait",
@@ -165,6 +190,7 @@ __all__ = [
     "plot_map",
     "plot_pinned",
     "plot_robot",
+    "plot_robustness",
     "plot_run",
     "preset_names",
     "read_basins",
@@ -177,12 +203,15 @@ __all__ = [
     "save_gait",
     "simulate",
     "simulate_many",
+    "stabilize",
     "standing",
+    "steer",
     "stream_many",
     "stride_map",
     "strip",
     "summarize",
     "summarize_walk",
+    "survive",
     "sweep",
     "switch_branch",
     "to_dataset",

@@ -12,25 +12,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexspine.errors import InputError, ParameterError
-from flexspine.models import ground as grounds
-from flexspine.models.ground import Ground, read_ground
+from flexspine.models.ground import SIGHT, Ground
 
 
 def test_heights_of_every_kind() -> None:
-    assert grounds.step(0.05, at=2.0).heights([1.99, 2.0, 9.0]).tolist() == [0.0, 0.05, 0.05]
-    assert grounds.step(0.05, at=2.0).height(2.0, ahead=False) == 0.0
-    stairs = grounds.stairs(0.1, 0.5, 3, at=1.0).heights([0.9, 1.2, 1.7, 2.2, 9.0])
+    assert Ground.step(0.05, at=2.0).heights([1.99, 2.0, 9.0]).tolist() == [0.0, 0.05, 0.05]
+    assert Ground.step(0.05, at=2.0).height(2.0, ahead=False) == 0.0
+    stairs = Ground.stairs(0.1, 0.5, 3, at=1.0).heights([0.9, 1.2, 1.7, 2.2, 9.0])
     assert stairs == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.3])
-    assert grounds.ramp(0.2, 4.0, at=1.0).heights([0, 2, 5, 8]) == pytest.approx(
-        [0, 0.05, 0.2, 0.2]
-    )
-    assert grounds.slope(-45, at=1.0).heights([0, 3]) == pytest.approx([0, -2])
-    wave = grounds.waves(0.1, 4.0, at=1.0).heights([0, 2, 4, 5])
+    assert Ground.ramp(0.2, 4.0, at=1.0).heights([0, 2, 5, 8]) == pytest.approx([0, 0.05, 0.2, 0.2])
+    assert Ground.slope(-45, at=1.0).heights([0, 3]) == pytest.approx([0, -2])
+    wave = Ground.waves(0.1, 4.0, at=1.0).heights([0, 2, 4, 5])
     assert wave == pytest.approx([0, 0.1, -0.1, 0])
 
 
 def test_rough_ground_repeats_for_a_seed_and_keeps_to_its_height() -> None:
-    one, same, other = (grounds.rough(0.03, 0.25, 50.0, seed) for seed in (1, 1, 2))
+    one, same, other = (Ground.rough(0.03, 0.25, 50.0, seed) for seed in (1, 1, 2))
     assert one == same
     assert one.points != other.points
     places = np.linspace(0, 60, 5000)
@@ -41,7 +38,7 @@ def test_rough_ground_repeats_for_a_seed_and_keeps_to_its_height() -> None:
 
 
 def test_blocks_are_level_between_faces() -> None:
-    ground = grounds.blocks(0.03, 0.5, 10.0, seed=4)
+    ground = Ground.blocks(0.03, 0.5, 10.0, seed=4)
     for k in range(19):
         inside = ground.heights(np.linspace(1.0 + 0.5 * k + 1e-9, 1.5 + 0.5 * k - 1e-9, 5))
         assert np.ptp(inside) == 0.0
@@ -65,7 +62,7 @@ def test_pieces_are_the_ground(
         piece = ground.piece(x, ahead=ahead)
         assert piece.start <= x <= piece.end
         assert piece.start < piece.end
-        assert piece.end - piece.start <= 2 * grounds.SIGHT + 1e-9
+        assert piece.end - piece.start <= 2 * SIGHT + 1e-9
         middle = (piece.start + piece.end) / 2
         expected = float(np.interp(middle, xs, ys))
         if middle < xs[0]:
@@ -73,26 +70,26 @@ def test_pieces_are_the_ground(
         if middle > xs[-1]:
             expected += after * (middle - xs[-1]) + wave * math.sin(math.pi * (middle - xs[-1]))
         assert ground.height(middle) == pytest.approx(expected, abs=1e-9)
-    near = ground.heights(np.linspace(x - grounds.SIGHT, x + grounds.SIGHT, 101))
+    near = ground.heights(np.linspace(x - SIGHT, x + SIGHT, 101))
     assert near.max() <= ground.top(x) + 1e-12
 
 
 def test_an_outline_runs_through_every_point() -> None:
-    ground = grounds.stairs(0.1, 0.5, 3, at=1.0)
+    ground = Ground.stairs(0.1, 0.5, 3, at=1.0)
     outline = ground.outline(0.0, 3.0)
     assert outline[0].tolist() == [0.0, 0.0]
     assert outline[-1] == pytest.approx([3.0, 0.3])
     assert outline[1:-1] == pytest.approx(np.array(ground.points))
-    waves = grounds.waves(0.1, 1.0).outline(0.0, 4.0)
+    waves = Ground.waves(0.1, 1.0).outline(0.0, 4.0)
     assert waves[:, 1].max() == pytest.approx(0.1, rel=1e-2)
 
 
 def test_ground_is_read_from_csv(tmp_path: Path) -> None:
     file = tmp_path / "track.csv"
     file.write_text("x,y\n0,0\n2,0.1\n2,0.2\n")
-    assert read_ground(file) == Ground("track.csv", ((0.0, 0.0), (2.0, 0.1), (2.0, 0.2)))
+    assert Ground.read(file) == Ground("track.csv", ((0.0, 0.0), (2.0, 0.1), (2.0, 0.2)))
     file.write_text("0,0\n\n1,0.5\n")
-    assert read_ground(file).height(0.5) == pytest.approx(0.25)
+    assert Ground.read(file).height(0.5) == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize(
@@ -110,32 +107,32 @@ def test_what_is_no_ground_is_told_in_one_line(tmp_path: Path, text: str, told: 
     file = tmp_path / "track.csv"
     file.write_text(text)
     with pytest.raises(InputError, match=told):
-        read_ground(file)
+        Ground.read(file)
 
 
 def test_a_file_that_is_missing_or_no_text_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="No such file"):
-        read_ground(tmp_path / "none.csv")
+        Ground.read(tmp_path / "none.csv")
     (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(InputError, match="cannot be read"):
-        read_ground(tmp_path / "bytes.csv")
+        Ground.read(tmp_path / "bytes.csv")
 
 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: grounds.rough(0.1, spacing=0.0),
-        lambda: grounds.rough(math.nan),
-        lambda: grounds.rough(0.1, seed=-1),
-        lambda: grounds.rough(0.1, spacing=1e-3, length=1e6),
-        lambda: grounds.waves(0.1, 0.0),
-        lambda: grounds.waves(math.inf),
-        lambda: grounds.slope(90),
-        lambda: grounds.stairs(0.1, count=0),
-        lambda: grounds.stairs(0.1, length=-1),
-        lambda: grounds.ramp(0.1, length=0),
-        lambda: grounds.step(math.nan),
-        lambda: grounds.step(0.1, at=math.nan),
+        lambda: Ground.rough(0.1, spacing=0.0),
+        lambda: Ground.rough(math.nan),
+        lambda: Ground.rough(0.1, seed=-1),
+        lambda: Ground.rough(0.1, spacing=1e-3, length=1e6),
+        lambda: Ground.waves(0.1, 0.0),
+        lambda: Ground.waves(math.inf),
+        lambda: Ground.slope(90),
+        lambda: Ground.stairs(0.1, count=0),
+        lambda: Ground.stairs(0.1, length=-1),
+        lambda: Ground.ramp(0.1, length=0),
+        lambda: Ground.step(math.nan),
+        lambda: Ground.step(0.1, at=math.nan),
     ],
 )
 def test_numbers_that_make_no_ground_are_refused(make: Callable[[], Ground]) -> None:

@@ -23,7 +23,6 @@ from flexspine import (
     to_dataset,
 )
 from flexspine.errors import ParameterError
-from flexspine.models import ground as grounds
 from flexspine.models.ground import Ground
 from flexspine.parameters import values
 
@@ -69,7 +68,7 @@ def test_beyond_a_step_it_goes_on_as_from_another_apex_height(
     face = float(to_dataset(before)["fore_toe_x"][-1])
     lower = {**before.apexes[-1], "height": before.apexes[-1]["height"] - height}
     after = simulate(flexible.with_values(apex=lower), strides=2)
-    run = simulate(flexible.on(grounds.step(height, at=face)), strides=3)
+    run = simulate(flexible.on(Ground.step(height, at=face)), strides=3)
     assert run.outcome.completed
     assert run.phases == (*before.phases, *after.phases[1:])
     end, expected = run.trajectory.end, after.trajectory.end
@@ -80,11 +79,11 @@ def test_beyond_a_step_it_goes_on_as_from_another_apex_height(
 
 
 GROUNDS = {
-    "slope": grounds.slope(-1.5, at=0.2),
-    "ramp": grounds.ramp(0.01, 1.0, at=0.4),
-    "waves": grounds.waves(0.004, 0.7, at=0.3),
-    "rough": grounds.rough(0.004, 0.11, 20.0, seed=5, at=0.3),
-    "blocks": grounds.blocks(-0.004, 0.35, 20.0, seed=1, at=0.3),
+    "slope": Ground.slope(-1.5, at=0.2),
+    "ramp": Ground.ramp(0.01, 1.0, at=0.4),
+    "waves": Ground.waves(0.004, 0.7, at=0.3),
+    "rough": Ground.rough(0.004, 0.11, 20.0, seed=5, at=0.3),
+    "blocks": Ground.blocks(-0.004, 0.35, 20.0, seed=1, at=0.3),
 }
 
 
@@ -170,7 +169,7 @@ def rigid_run(model: Model, height: Callable[[float], float], until: float) -> A
 def test_a_second_implementation_runs_the_same_over_slopes_and_waves(kind: str) -> None:
     model = load_model("kamimura2015-rigid")
     here, wave = 0.3, (0.004, 0.7)
-    track = {"waves": grounds.waves(*wave, at=here), "slope": grounds.slope(-1.5, at=here)}[kind]
+    track = {"waves": Ground.waves(*wave, at=here), "slope": Ground.slope(-1.5, at=here)}[kind]
 
     def height(x: float) -> float:
         if x < here:
@@ -192,18 +191,18 @@ def test_a_second_implementation_runs_the_same_over_slopes_and_waves(kind: str) 
 def test_a_foot_against_a_face_stumbles(flexible: Model) -> None:
     """The fore foot comes down 5 ms before the first touchdown's place, lower than the face."""
     flat = touchdowns(simulate(flexible.on(FLAT)))[0][0]
-    run = simulate(flexible.on(grounds.step(0.05, at=flat - 0.02)))
+    run = simulate(flexible.on(Ground.step(0.05, at=flat - 0.02)))
     assert run.outcome.name == "stumbled"
     assert "fore toe against a face" in run.outcome.message
     assert run.trajectory.crossings == ()
-    higher = simulate(flexible.on(grounds.step(0.05, at=flat + 0.02)), duration=0.02)
+    higher = simulate(flexible.on(Ground.step(0.05, at=flat + 0.02)), duration=0.02)
     assert higher.outcome.completed
 
 
 def test_a_body_against_a_wall_stumbles_and_one_on_a_hill_falls(flexible: Model) -> None:
     wall = simulate(flexible.on(Ground("wall", ((0.5, 0.0), (0.5, 1.0)))))
     assert wall.outcome.name == "stumbled"
-    hill = grounds.ramp(0.5, 0.6, at=0.35)
+    hill = Ground.ramp(0.5, 0.6, at=0.35)
     # Toes come down on the hill or not; what counts is that nothing passes through it.
     run = simulate(flexible.on(hill), strides=3)
     assert run.outcome.name == "fell"
@@ -220,7 +219,7 @@ def test_a_body_against_a_wall_stumbles_and_one_on_a_hill_falls(flexible: Model)
 
 def test_legs_on_the_ground_at_the_start_stand_on_it(flexible: Model) -> None:
     start = {"com_x": 2.0, "com_y": 0.40, "com_x_rate": 3.0}
-    ramp = grounds.ramp(0.1, 2.0, at=1.0)
+    ramp = Ground.ramp(0.1, 2.0, at=1.0)
     run = simulate(flexible.on(ramp), duration=0.001, state=start, toes={"fore": 2.3})
     assert run.phases[0] == "FS"
     data = to_dataset(run)
@@ -228,7 +227,7 @@ def test_legs_on_the_ground_at_the_start_stand_on_it(flexible: Model) -> None:
 
 
 def test_gaits_sweeps_and_derivatives_are_of_flat_ground(flexible: Model) -> None:
-    model = flexible.on(grounds.slope(1.0))
+    model = flexible.on(Ground.slope(1.0))
     for ask in (examine, stride_map, simulate_many):
         with pytest.raises(ParameterError, match="flat ground"):
             ask(model)

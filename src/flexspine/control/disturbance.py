@@ -12,7 +12,7 @@ from flexspine.control.stabilize import Stabilizer
 from flexspine.control.steering import Noise, SteeredRun, steer
 from flexspine.errors import UnknownNameError
 from flexspine.hybrid.outcome import COMPLETED
-from flexspine.models import ground as grounds
+from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model
 
 
@@ -44,21 +44,21 @@ def _push(model: Model, size: float, _where: float, _seed: int, _stride: float) 
 
 
 def _step(model: Model, size: float, where: float, _seed: int, stride: float) -> Upset:
-    return Upset(model.on(grounds.step(size, at=grounds.BEGINS + where * stride)))
+    return Upset(model.on(Ground.step(size, at=BEGINS + where * stride)))
 
 
 def _rough(model: Model, size: float, where: float, seed: int, stride: float) -> Upset:
-    return Upset(model.on(_far(grounds.rough, size, where, seed, stride)))
+    return Upset(model.on(_far(Ground.rough, size, where, seed, stride)))
 
 
 def _blocks(model: Model, size: float, where: float, seed: int, stride: float) -> Upset:
-    return Upset(model.on(_far(grounds.blocks, size, where, seed, stride)))
+    return Upset(model.on(_far(Ground.blocks, size, where, seed, stride)))
 
 
 def _far(
-    make: Callable[..., grounds.Ground], size: float, where: float, seed: int, stride: float
-) -> grounds.Ground:
-    at = grounds.BEGINS + where * stride
+    make: Callable[..., Ground], size: float, where: float, seed: int, stride: float
+) -> Ground:
+    at = BEGINS + where * stride
     return make(size, SPACING, LENGTH, seed, at)
 
 

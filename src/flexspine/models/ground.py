@@ -136,6 +136,82 @@ class Ground:
         points = np.column_stack([self.xs[inner], self.ys[inner]])
         return np.array([*before, *map(tuple, points), *after], dtype=float)
 
+    @classmethod
+    def step(cls, height: float, at: float = BEGINS) -> Ground:
+        """One step up by ``height`` m (down if negative), its face at x = ``at``."""
+        return cls(f"step of {height:g} m", ((at, 0.0), (at, height)))
+
+    @classmethod
+    def stairs(
+        cls, height: float, length: float = 1.0, count: int = 5, at: float = BEGINS
+    ) -> Ground:
+        """``count`` steps by ``height`` m, each ``length`` m after the one before."""
+        _check("length", length, 1e-3, 1e6)
+        _check("count", count, 1, MOST_POINTS / 2)
+        faces = range(int(count))
+        points = [(at + length * k, height * (k + up)) for k in faces for up in (0, 1)]
+        return cls(f"{int(count)} steps of {height:g} m", tuple(points))
+
+    @classmethod
+    def ramp(cls, height: float, length: float = 1.0, at: float = BEGINS) -> Ground:
+        """Up by ``height`` m over ``length`` m, and level again."""
+        _check("length", length, 1e-3, 1e6)
+        return cls(f"ramp of {height:g} m over {length:g} m", ((at, 0.0), (at + length, height)))
+
+    @classmethod
+    def slope(cls, degrees: float, at: float = BEGINS) -> Ground:
+        """From x = ``at`` on uphill by ``degrees``, downhill if negative."""
+        _check("angle", degrees, -80, 80)
+        return cls(f"slope of {degrees:g} degrees", ((at, 0.0),), after=tan(radians(degrees)))
+
+    @classmethod
+    def waves(cls, amplitude: float, wavelength: float = 1.0, at: float = BEGINS) -> Ground:
+        """From x = ``at`` on a sinusoid."""
+        name = f"waves of {amplitude:g} m, {wavelength:g} m long"
+        return cls(name, ((at, 0.0),), amplitude=amplitude, wavelength=wavelength)
+
+    @classmethod
+    def rough(
+        cls,
+        height: float,
+        spacing: float = 0.3,
+        length: float = 100.0,
+        seed: int = 0,
+        at: float = BEGINS,
+    ) -> Ground:
+        """Lines between heights drawn from -``height`` to ``height`` m, ``spacing`` m apart."""
+        heights = _drawn(height, spacing, length, seed)
+        points = [(at, 0.0), *((at + spacing * (k + 1), y) for k, y in enumerate(heights))]
+        return cls(f"rough ground of {height:g} m, seed {seed}", tuple(points))
+
+    @classmethod
+    def blocks(
+        cls,
+        height: float,
+        spacing: float = 0.3,
+        length: float = 100.0,
+        seed: int = 0,
+        at: float = BEGINS,
+    ) -> Ground:
+        """Level blocks ``spacing`` m long, as high as drawn from -``height`` to ``height`` m."""
+        before, points = 0.0, []
+        for k, y in enumerate(_drawn(height, spacing, length, seed)):
+            points += [(at + spacing * k, before), (at + spacing * k, y)]
+            before = y
+        return cls(f"blocks of {height:g} m, seed {seed}", tuple(points))
+
+    @classmethod
+    def read(cls, path: str | Path) -> Ground:
+        """Read points of the ground from CSV, with columns x and y in m. Raises `InputError`."""
+        file = Path(path)
+        try:
+            with file.open(newline="", encoding="utf-8") as lines:
+                points = tuple(_points(file, csv.reader(lines)))
+        except (OSError, UnicodeDecodeError, csv.Error) as failure:
+            reason = getattr(failure, "strerror", None) or failure
+            raise InputError(f"'{file}' cannot be read ({reason})", "give a CSV file") from failure
+        return cls(file.name, points)
+
 
 def _check(what: str, value: float, low: float, high: float) -> None:
     if not (is_number(value) and low <= value <= high):
@@ -143,58 +219,6 @@ def _check(what: str, value: float, low: float, high: float) -> None:
             f"{what} = {shortened(value)} of the ground is not usable",
             f"give a number from {low:g} to {high:g}",
         )
-
-
-def step(height: float, at: float = BEGINS) -> Ground:
-    """One step up by ``height`` m (down if negative), its face at x = ``at``."""
-    return Ground(f"step of {height:g} m", ((at, 0.0), (at, height)))
-
-
-def stairs(height: float, length: float = 1.0, count: int = 5, at: float = BEGINS) -> Ground:
-    """``count`` steps by ``height`` m, each ``length`` m after the one before."""
-    _check("length", length, 1e-3, 1e6)
-    _check("count", count, 1, MOST_POINTS / 2)
-    faces = range(int(count))
-    points = [(at + length * k, height * (k + up)) for k in faces for up in (0, 1)]
-    return Ground(f"{count} steps of {height:g} m", tuple(points))
-
-
-def ramp(height: float, length: float = 1.0, at: float = BEGINS) -> Ground:
-    """Up by ``height`` m over ``length`` m, and level again."""
-    _check("length", length, 1e-3, 1e6)
-    return Ground(f"ramp of {height:g} m over {length:g} m", ((at, 0.0), (at + length, height)))
-
-
-def slope(degrees: float, at: float = BEGINS) -> Ground:
-    """From x = ``at`` on uphill by ``degrees``, downhill if negative."""
-    _check("angle", degrees, -80, 80)
-    return Ground(f"slope of {degrees:g} degrees", ((at, 0.0),), after=tan(radians(degrees)))
-
-
-def waves(amplitude: float, wavelength: float = 1.0, at: float = BEGINS) -> Ground:
-    """From x = ``at`` on a sinusoid."""
-    name = f"waves of {amplitude:g} m, {wavelength:g} m long"
-    return Ground(name, ((at, 0.0),), amplitude=amplitude, wavelength=wavelength)
-
-
-def rough(
-    height: float, spacing: float = 0.3, length: float = 100.0, seed: int = 0, at: float = BEGINS
-) -> Ground:
-    """Lines between heights drawn from -``height`` to ``height`` m, ``spacing`` m apart."""
-    heights = _drawn(height, spacing, length, seed)
-    points = [(at, 0.0), *((at + spacing * (k + 1), y) for k, y in enumerate(heights))]
-    return Ground(f"rough ground of {height:g} m, seed {seed}", tuple(points))
-
-
-def blocks(
-    height: float, spacing: float = 0.3, length: float = 100.0, seed: int = 0, at: float = BEGINS
-) -> Ground:
-    """Level blocks ``spacing`` m long, as high as drawn from -``height`` to ``height`` m."""
-    before, points = 0.0, []
-    for k, y in enumerate(_drawn(height, spacing, length, seed)):
-        points += [(at + spacing * k, before), (at + spacing * k, y)]
-        before = y
-    return Ground(f"blocks of {height:g} m, seed {seed}", tuple(points))
 
 
 def _drawn(height: float, spacing: float, length: float, seed: int) -> list[float]:
@@ -208,18 +232,6 @@ def _drawn(height: float, spacing: float, length: float, seed: int) -> list[floa
         raise ParameterError(f"{count} pieces of ground are too many", "make them longer, or fewer")
     drawn: list[float] = (height * np.random.default_rng(seed).uniform(-1, 1, count)).tolist()
     return drawn
-
-
-def read_ground(path: str | Path) -> Ground:
-    """Read points of the ground from CSV, with columns x and y in m. Raises `InputError`."""
-    file = Path(path)
-    try:
-        with file.open(newline="", encoding="utf-8") as lines:
-            points = tuple(_points(file, csv.reader(lines)))
-    except (OSError, UnicodeDecodeError, csv.Error) as failure:
-        reason = getattr(failure, "strerror", None) or failure
-        raise InputError(f"'{file}' cannot be read ({reason})", "give a CSV file") from failure
-    return Ground(file.name, points)
 
 
 def _points(file: Path, rows: Iterable[list[str]]) -> Iterable[tuple[float, float]]:

@@ -13,8 +13,7 @@ from flexspine.control.disturbance import Fate
 from flexspine.control.steering import SteeredRun, Steering, steer
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.compile import Array
-from flexspine.models import ground as grounds
-from flexspine.models.ground import Ground, read_ground
+from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.studies.robustness import about
@@ -43,7 +42,7 @@ class Terrain:
         if self.kind.endswith(".csv"):
             if self.numbers:
                 raise ParameterError("ground from a file has no numbers", "leave them away")
-            return read_ground(self.kind)
+            return Ground.read(self.kind)
         if self.kind not in KINDS:
             raise UnknownNameError("kind of ground", self.kind, KINDS)
         make, known = KINDS[self.kind]
@@ -52,20 +51,20 @@ class Terrain:
                 raise UnknownNameError(f"number of '{self.kind}'", name, known)
         given: dict[str, Any] = {**known, **self.numbers}
         if self.kind in RANDOM:
-            given |= {"length": RESERVE * stride * strides + grounds.BEGINS, "seed": seed}
+            given |= {"length": RESERVE * stride * strides + BEGINS, "seed": seed}
         where = float(np.random.default_rng(seed).uniform())
-        return make(**given, at=grounds.BEGINS + where * stride)
+        return make(**given, at=BEGINS + where * stride)
 
 
 # How each kind is made, and its numbers where none are given.
 KINDS: Mapping[str, tuple[Callable[..., Ground], Mapping[str, float]]] = {
-    "step": (grounds.step, {"height": -0.01}),
-    "stairs": (grounds.stairs, {"height": -0.01, "length": 2.0, "count": 5}),
-    "ramp": (grounds.ramp, {"height": 0.02, "length": 5.0}),
-    "slope": (grounds.slope, {"degrees": -0.3}),
-    "waves": (grounds.waves, {"amplitude": 0.005, "wavelength": 1.0}),
-    "rough": (grounds.rough, {"height": 0.005, "spacing": 0.3}),
-    "blocks": (grounds.blocks, {"height": 0.002, "spacing": 0.3}),
+    "step": (Ground.step, {"height": -0.01}),
+    "stairs": (Ground.stairs, {"height": -0.01, "length": 2.0, "count": 5}),
+    "ramp": (Ground.ramp, {"height": 0.02, "length": 5.0}),
+    "slope": (Ground.slope, {"degrees": -0.3}),
+    "waves": (Ground.waves, {"amplitude": 0.005, "wavelength": 1.0}),
+    "rough": (Ground.rough, {"height": 0.005, "spacing": 0.3}),
+    "blocks": (Ground.blocks, {"height": 0.002, "spacing": 0.3}),
 }
 RANDOM = ("rough", "blocks")
 
