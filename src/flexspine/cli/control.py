@@ -111,7 +111,7 @@ def report(record: dict[str, Any]) -> str:
     """The run in a few lines for a person."""
     radius = record["spectral_radius"]
     often = "twice" if record["acts_per_stride"] == 2 else "once"
-    level = radius["with, on the energy level"]
+    level = radius["on_level"]
     with_it = f"{radius['with']:.4f}"
     if level < radius["with"] - 1e-6:
         with_it = f"{level:.4f} on the energy level, which is kept"

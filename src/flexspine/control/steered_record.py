@@ -16,7 +16,11 @@ from flexspine.parameters import values
 
 
 def stabilizer_record(stabilizer: Stabilizer) -> dict[str, Any]:
-    """The gait, what is steered, gains in natural units, multipliers without and with feedback."""
+    """The gait, what is steered, gains in natural units, multipliers without and with feedback.
+
+    The spectral radius ``on_level`` is that with feedback, but for the multiplier 1 of an energy
+    that nothing changes.
+    """
     gait = stabilizer.gait
     free = floquet_multipliers(gait)
     return {
@@ -38,7 +42,7 @@ def stabilizer_record(stabilizer: Stabilizer) -> dict[str, Any]:
         "spectral_radius": {
             "without": free.spectral_radius,
             "with": float(np.abs(stabilizer.multipliers[0])),
-            "with, on the energy level": stabilizer.level_spectral_radius,
+            "on_level": stabilizer.level_spectral_radius,
         },
     }
 
