@@ -81,7 +81,7 @@ def _details(record: Mapping[str, Any]) -> list[str]:
     parts = [
         f"{record['method']}, {often}",
         f"spectral radius {radius['without']:.3f} without feedback, "
-        f"{radius['with, on the energy level']:.3f} with it",
+        f"{radius['on_level']:.3f} with it",
     ]
     if noise["acting"]:
         kind = "uniform, up to" if noise["uniform"] else "Gaussian,"
