@@ -217,7 +217,7 @@ def energy_slope(apex: dict[str, float], name: str) -> float:
     """Of the published flexible body at 260 N m/rad, by the second implementation's energy."""
     linkage = reference.Linkage(flexible_body(260.0))
     above, below = (
-        linkage.energy(linkage.pack(apex | {name: apex[name] + step}), {}) for step in (1e-5, -1e-5)
+        linkage.energy(linkage.pack(apex | {name: apex[name] + step})) for step in (1e-5, -1e-5)
     )
     return (above - below) / 2e-5
 

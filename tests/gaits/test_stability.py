@@ -204,7 +204,7 @@ def test_the_energy_at_the_apex_and_its_gradient_are_those_of_the_second_impleme
 
     def theirs(name: str, step: float) -> float:
         apex = dict(model.apex)
-        return linkage.energy(linkage.pack(apex | {name: apex[name] + step}), {})
+        return linkage.energy(linkage.pack(apex | {name: apex[name] + step}))
 
     assert energy.values[0] == pytest.approx(theirs("height", 0.0), rel=1e-13)
     for name, symbol in model.system.section.coordinates.items():
