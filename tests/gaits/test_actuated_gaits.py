@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flexspine import Gait, Model, find_gaits, load_model, summarize
-from flexspine.gaits.search import Search
+from flexspine.gaits.search import Search, pose_problems
 from tests import second_implementation as reference
 from tests.models.test_second_actuation import body_of
 
@@ -68,3 +68,10 @@ def test_such_gaits_close_in_the_second_implementation_and_gain_what_they_lose(
         linkage = reference.Linkage(body)
         cost = given / (linkage.mass * linkage.gravity * theirs.end["distance"])
         assert summarize(gait.run).cost_of_transport == pytest.approx(cost, abs=CLOSED)
+
+
+def test_a_passive_animal_with_a_free_actuator_is_searched_for_general_gaits(
+    flexible: Model,
+) -> None:
+    problems = pose_problems(flexible, SETTING, free={"legs.extension": RANGE})
+    assert [problem.symmetric for problem in problems] == [False]

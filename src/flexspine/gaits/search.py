@@ -127,7 +127,7 @@ def pose_problems(
     """What `find_gaits` solves: symmetric gaits, general ones, or both. Raises as it does."""
     kinds = [symmetric] if symmetric is not None else [True, False]
     named = {*fixed, *(bounds or {}), *(free or {})}
-    if symmetric is None and not _symmetry_allows(model, named):
+    if symmetric is None and not _symmetry_allows(model.keeping(free or ()), named):
         kinds = [False]
     problems = [
         Problem(model, fixed, free=tuple(free or ()), symmetric=kind, tolerance=tolerance)
