@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import pytest
 
 from flexspine import Gait, Model, find_gaits, load_model, summarize
@@ -68,6 +70,17 @@ def test_such_gaits_close_in_the_second_implementation_and_gain_what_they_lose(
         linkage = reference.Linkage(body)
         cost = given / (linkage.mass * linkage.gravity * theirs.end["distance"])
         assert summarize(gait.run).cost_of_transport == pytest.approx(cost, abs=CLOSED)
+
+
+def test_an_animal_without_losses_has_its_own_gaits_each_of_them_once() -> None:
+    """An actuator set free stays at rest, up to rounding."""
+    found = find_gaits(animal(), SETTING, free={"legs.extension": (-0.01, 0.01)})
+    for gait in found:
+        assert gait.model.numbers["legs.extension"] == pytest.approx(0, abs=1e-12)
+    published = load_model("kamimura2015-flexible").touchdown["fore"]
+    assert any(abs(gait.model.touchdown["fore"] - published) < CLOSED for gait in found)
+    for one, other in combinations(found, 2):
+        assert abs(one.period - other.period) > 1e-4
 
 
 def test_a_passive_animal_with_a_free_actuator_is_searched_for_general_gaits(

@@ -221,6 +221,12 @@ def _try(problem: Problem, sampler: Sampler, found: list[Gait], tally: Counter[s
         found.append(gait)
 
 
+def _size(model: Model, name: str) -> float:
+    """What a difference of a parameter is measured by; it may vanish only if it may be negative."""
+    own = abs(model.numbers[name])
+    return max(own, model.scales.get(name, 1.0)) if name in model.signed else own
+
+
 def _nearly_singular(matrix: Array) -> bool:
     return float(np.linalg.svd(matrix, compute_uv=False)[-1]) < SINGULAR
 
@@ -243,7 +249,7 @@ def same_orbit(one: Gait, other: Gait, apart: float = DISTINCT) -> bool:
     if max(angles) > apart:
         return False
     parameters, others = values(one.model.parameters), values(other.model.parameters)
-    if any(abs(parameters[n] - others[n]) > DISTINCT * abs(others[n]) for n in parameters):
+    if any(abs(parameters[n] - others[n]) > DISTINCT * _size(one.model, n) for n in parameters):
         return False
     start = one.orbit[0]
     return bool(np.any(np.max(np.abs(other.orbit - start), axis=1) < apart))

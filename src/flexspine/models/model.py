@@ -19,7 +19,7 @@ from flexspine.models.bounder import FORE, HIND, BounderKind, beneath, works
 from flexspine.models.ground import Ground
 from flexspine.models.legs import SIDES, phase_of
 from flexspine.models.underfoot import OnGround, begin
-from flexspine.parameters import ParameterSet, is_number, replaced, shortened, values
+from flexspine.parameters import ParameterSet, is_number, quantities, replaced, shortened, values
 
 # Below the first, rounding exceeds the truncation; above the second, nothing said here holds.
 TOLERANCES = (1e-17, 1e-3)
@@ -159,6 +159,12 @@ class Model:
         """Every value by name: apex coordinates, touchdown angles and parameters."""
         angles = {f"touchdown.{side}": angle for side, angle in self.touchdown.items()}
         return {**self.apex, **angles, **values(self.parameters)}
+
+    @cached_property
+    def signed(self) -> frozenset[str]:
+        """Parameters that may be negative: actuators, angles. By dotted name."""
+        known = quantities(type(self.parameters))
+        return frozenset(each.name for each in known if each.lower < 0)
 
     @cached_property
     def alike(self) -> bool:
