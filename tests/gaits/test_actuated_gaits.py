@@ -6,7 +6,7 @@ from itertools import combinations
 
 import pytest
 
-from flexspine import Gait, Model, find_gaits, load_model, summarize
+from flexspine import Gait, Model, find_gaits, load_model, summarize, trace_branch
 from flexspine.gaits.search import Search, pose_problems
 from tests import second_implementation as reference
 from tests.models.test_second_actuation import body_of
@@ -70,6 +70,27 @@ def test_such_gaits_close_in_the_second_implementation_and_gain_what_they_lose(
         linkage = reference.Linkage(body)
         cost = given / (linkage.mass * linkage.gravity * theirs.end["distance"])
         assert summarize(gait.run).cost_of_transport == pytest.approx(cost, abs=CLOSED)
+
+
+def test_a_gait_is_found_from_an_actuator_that_works_already(damped: Search) -> None:
+    """The range may begin at nothing all the same: a length is no scale."""
+    model = animal(**{"spine.damping": 1.0, "legs.extension": 0.005})
+    found = find_gaits(model, SETTING, free={"legs.extension": RANGE})
+    gait, expected = published_like(found), published_like(damped)
+    assert gait.model.touchdown == pytest.approx(expected.model.touchdown, abs=CLOSED)
+    numbers, known = gait.model.numbers, expected.model.numbers
+    assert numbers["legs.extension"] == pytest.approx(known["legs.extension"], abs=CLOSED)
+
+
+def test_a_branch_leads_through_the_point_where_an_actuator_does_nothing(damped: Search) -> None:
+    """From legs that push differently to legs that push differently the other way round."""
+    way = {"over": "fore.leg.extension", "fixed": SETTING, "free": ["legs.extension"]}
+    there = trace_branch(published_like(damped), **way, bounds=(-1e-3, 1e-3))
+    assert there.ends == tuple(f"reached fore.leg.extension = {end}" for end in (-0.001, 0.001))
+    back = trace_branch(there.gaits[-1], **way, bounds=(-1e-3, 1e-3), most_points=100)
+    assert back.ends == there.ends
+    (again,), (before,) = back.at(0.0), there.at(0.0)
+    assert again.gait.model.apex == pytest.approx(before.gait.model.apex, abs=CLOSED)
 
 
 def test_an_animal_without_losses_has_its_own_gaits_each_of_them_once() -> None:

@@ -92,7 +92,9 @@ class Problem:
         self._scale_of = {**dict.fromkeys(free, 1.0), **model.scales}
         self.scales = np.array([self._scale_of[name] for name in self.unknowns])
         given = values(model.parameters)
-        self._logarithmic = {name: given[name] for name in free if given[name] > 0}
+        self._logarithmic = {
+            name: given[name] for name in free if given[name] > 0 and name not in model.signed
+        }
         self._lay_out(spanned)
         coordinates = self.system.section.coordinates
         self._section = [self.system.places[s] for s in coordinates.values()]
@@ -173,7 +175,8 @@ class Problem:
     def moves(self, parameters: Array) -> tuple[Array, Array]:
         """What each unknown moves, SI per natural unit: states (n, u) and parameters (p, u).
 
-        A free parameter that is positive counts by its logarithm, so it depends on where it is.
+        A free parameter that is positive, and cannot be negative, counts by its logarithm, so it
+        depends on where it is.
         """
         moves = self._parameter_moves
         if self._log_rows:

@@ -154,7 +154,7 @@ def _check_request(
     for name, (low, high) in free.items():
         if not (is_number(low) and is_number(high)):
             raise ParameterError(f"'{name}' from {low} to {high} is no range", "give two numbers")
-        if low <= 0 < given.get(name, 0.0):
+        if low <= 0 < given.get(name, 0.0) and name not in model.signed:
             raise ParameterError(
                 f"'{name}' from {low:g} to {high:g} would vanish", "give a range above zero"
             )
