@@ -171,7 +171,7 @@ def _unstable() -> FlexspineError:
 
 def _scales(model: Model, inputs: tuple[str, ...]) -> tuple[Array, Array]:
     states = np.array([model.scales[name] for name in model.system.section.coordinates])
-    return states, np.array([model.scales.get(name, 1.0) for name in inputs])
+    return states, np.array([model.unit_of(name) for name in inputs])
 
 
 def _parts(gait: Gait, inputs: tuple[str, ...], twice: bool) -> tuple[Part, ...]:

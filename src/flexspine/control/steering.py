@@ -29,6 +29,9 @@ from flexspine.models.underfoot import TOES, OnGround, lose
 # What no touchdown angle is steered beyond, in rad from the vertical.
 STEEPEST = 1.4
 
+# How far anything else is steered away from what it was, in natural units: a quarter of a leg.
+FARTHEST = 0.25
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -128,7 +131,11 @@ class SteeredBounder(OnGround):
         self._rows = section_rows(system)
         self._height = list(system.section.coordinates).index("height")
         self._inputs = [system.places[symbol] for symbol in symbols]
-        self._angles = np.array([name.startswith("touchdown.") for name in steering.inputs])
+        angles = np.array([name.startswith("touchdown.") for name in steering.inputs])
+        usual = np.array([model.numbers[name] for name in steering.inputs])
+        reach = FARTHEST * np.array([model.unit_of(name) for name in steering.inputs])
+        self._least = np.where(angles, -STEEPEST, usual - reach)
+        self._most = np.where(angles, STEEPEST, usual + reach)
         self._stood = [system.places[flag] for flag in STOOD]
         self._scales = np.array([model.scales[name] for name in system.section.coordinates])
 
@@ -164,7 +171,7 @@ class SteeredBounder(OnGround):
             draw = self._random.uniform(-1, 1, size) if self.noise.uniform else None
             off = self._random.standard_normal(size) if draw is None else draw
             done = wanted * (1 + self.noise.acting * off)
-        done = np.where(self._angles, np.clip(done, -STEEPEST, STEEPEST), done)
+        done = np.clip(done, self._least, self._most)
         return done if before is None else np.where(wanted == before, before, done)
 
     def inputs_of(self, point: HybridState) -> dict[str, float]:

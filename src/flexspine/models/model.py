@@ -204,6 +204,13 @@ class Model:
             for name in ACTUATORS
         }
 
+    def unit_of(self, name: str) -> float:
+        """The natural unit of a quantity or a parameter: its scale, or its size where it has none.
+
+        One for what has neither.
+        """
+        return self.scales.get(name) or abs(self.numbers[name]) or 1.0
+
     @cached_property
     def parameter_vector(self) -> Array:
         """Parameters and touchdown angles in the order of ``system.parameters``."""
