@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, log
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexspine.errors import ParameterError, UnknownNameError
+from flexspine.gaits.parameter_scale import ParameterScale
 from flexspine.hybrid.compile import Array, BoundSystem, compile_system
 from flexspine.hybrid.functions import balance, section_quantities
 from flexspine.hybrid.integrate import integrate
@@ -92,9 +93,7 @@ class Problem:
         self._scale_of = {**dict.fromkeys(free, 1.0), **model.scales}
         self.scales = np.array([self._scale_of[name] for name in self.unknowns])
         given = values(model.parameters)
-        self._logarithmic = {
-            name: given[name] for name in free if given[name] > 0 and name not in model.signed
-        }
+        self._counted = {name: self._count(name, given[name]) for name in free}
         self._lay_out(spanned)
         coordinates = self.system.section.coordinates
         self._section = [self.system.places[s] for s in coordinates.values()]
@@ -140,6 +139,12 @@ class Problem:
                     f"'{name}' would make the ends differ", "look for general gaits"
                 )
 
+    def _count(self, name: str, given: float) -> ParameterScale:
+        """How a free parameter is counted."""
+        if name in self.model.may_vanish or given <= 0:
+            return ParameterScale(self._scale_of[name], vanishes=True)
+        return ParameterScale(given, vanishes=False)
+
     def _spanned(self) -> dict[str, dict[Any, int]]:
         """Coordinates of the start: by name, the states each one moves."""
         if self.symmetric and self.system.reversal:
@@ -168,30 +173,30 @@ class Problem:
                 self._base_parameters[row] = self.fixed[name]
         self._state_moves = state_moves * self.scales
         self._parameter_moves = parameter_moves * self.scales
-        self._log_rows = [model.parameter_names.index(name) for name in self._logarithmic]
-        self._log_columns = [self.unknowns.index(name) for name in self._logarithmic]
+        self._places = {
+            name: (model.parameter_names.index(name), self.unknowns.index(name))
+            for name in self.free
+        }
         self._held = np.zeros(len(system.held))
 
     def moves(self, parameters: Array) -> tuple[Array, Array]:
         """What each unknown moves, SI per natural unit: states (n, u) and parameters (p, u).
 
-        A free parameter that is positive, and cannot be negative, counts by its logarithm, so it
-        depends on where it is.
+        What free parameters move depends on where they are.
         """
-        moves = self._parameter_moves
-        if self._log_rows:
-            moves = moves.copy()
-            moves[self._log_rows, self._log_columns] = parameters[self._log_rows]
+        moves = self._parameter_moves.copy()
+        for name, (row, column) in self._places.items():
+            moves[row, column] = self._counted[name].slope(float(parameters[row]))
         return self._state_moves, moves
 
     def unit_of(self, name: str, value: float) -> float:
         """What a natural unit of an unknown is at a value of it, SI."""
-        return value if name in self._logarithmic else self.scale_of(name)
+        return self._counted[name].slope(value) if name in self._counted else self.scale_of(name)
 
     def coordinate(self, name: str, value: float) -> float:
         """The entry of a vector that stands for a value of an unknown, SI."""
-        if name in self._logarithmic:
-            return log(value / self._logarithmic[name])
+        if name in self._counted:
+            return self._counted[name].coordinate(value)
         return value / self.scale_of(name)
 
     @property
@@ -244,9 +249,8 @@ class Problem:
     def expand(self, point: Array) -> tuple[Array, Array]:
         """Return the states and the parameters that a point stands for."""
         parameters = self._base_parameters + self._parameter_moves @ point
-        if self._log_rows:
-            bases = list(self._logarithmic.values())
-            parameters[self._log_rows] = bases * np.exp(point[self._log_columns])
+        for name, (row, column) in self._places.items():
+            parameters[row] = self._counted[name].value(float(point[column]))
         return self._base_states + self._state_moves @ point, parameters
 
     def evaluate(self, point: Array) -> Evaluation:

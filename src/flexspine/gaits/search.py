@@ -154,7 +154,7 @@ def _check_request(
     for name, (low, high) in free.items():
         if not (is_number(low) and is_number(high)):
             raise ParameterError(f"'{name}' from {low} to {high} is no range", "give two numbers")
-        if low <= 0 < given.get(name, 0.0) and name not in model.signed:
+        if low <= 0 < given.get(name, 0.0) and name not in model.may_vanish:
             raise ParameterError(
                 f"'{name}' from {low:g} to {high:g} would vanish", "give a range above zero"
             )
@@ -222,9 +222,9 @@ def _try(problem: Problem, sampler: Sampler, found: list[Gait], tally: Counter[s
 
 
 def _size(model: Model, name: str) -> float:
-    """What a difference of a parameter is measured by; it may vanish only if it may be negative."""
+    """What a difference of a parameter is measured by."""
     own = abs(model.numbers[name])
-    return max(own, model.scales.get(name, 1.0)) if name in model.signed else own
+    return max(own, model.scales.get(name, 1.0)) if name in model.may_vanish else own
 
 
 def _nearly_singular(matrix: Array) -> bool:

@@ -161,10 +161,12 @@ class Model:
         return {**self.apex, **angles, **values(self.parameters)}
 
     @cached_property
-    def signed(self) -> frozenset[str]:
-        """Parameters that may be negative: actuators, angles. By dotted name."""
+    def may_vanish(self) -> frozenset[str]:
+        """Parameters that animals can do without: of actuators and dampers, rest angles."""
         known = quantities(type(self.parameters))
-        return frozenset(each.name for each in known if each.lower < 0)
+        return frozenset(
+            each.name for each in known if each.lower < 0 or each.name.endswith(".damping")
+        )
 
     @cached_property
     def alike(self) -> bool:
