@@ -38,6 +38,11 @@ class Branch:
     ends: tuple[str, str]
 
     @property
+    def free(self) -> tuple[str, ...]:
+        """The parameters that change along it besides ``over``."""
+        return tuple(name for name in self.family.problem.free if name != self.over)
+
+    @property
     def gaits(self) -> tuple[Gait, ...]:
         """The gaits of its points."""
         return tuple(point.gait for point in self.points)
@@ -145,6 +150,9 @@ def family_of(
         name: value for name, value in (own if fixed is None else fixed).items() if name != over
     }
     unknown = (*(() if over in known else (over,)), *free)
+    for name in unknown:
+        if unknown.count(name) > 1:
+            raise ParameterError(f"'{name}' is asked for twice", "name it once")
     reversible = gait.model.keeping(unknown).features.reversible
     mirrored = gait.symmetric and reversible if symmetric is None else symmetric
     problem = Problem(
@@ -160,11 +168,16 @@ def family_of(
             f"'{over}' does not change along symmetric gaits", "follow general ones"
         )
     if problem.surplus != 1:
-        many = "too few" if problem.surplus > 1 else "too many"
-        raise ParameterError(
-            f"{', '.join(kept) or 'nothing'} kept along {over} are {many} quantities",
-            "keep energy, height and mean_speed, without the one that is followed",
+        few = problem.surplus > 1
+        told = (
+            f"{', '.join(kept) or 'nothing'} kept along {over} are too {'few' if few else 'many'}"
         )
+        remedy = "keep energy, height and mean_speed, without the one that is followed"
+        if few and free:
+            remedy = "keep more, such as touchdown.fore, or set fewer parameters free"
+        elif not few and not problem.system.section.conserved:
+            remedy = "set free what makes good the energy lost, such as legs.extension"
+        raise ParameterError(f"{told} quantities", remedy)
     return Family(problem, over)
 
 

@@ -70,6 +70,11 @@ class Family:
         )
         self._dropped: int | None = None
 
+    @property
+    def conservative(self) -> bool:
+        """Whether all its gaits keep their energy, whatever its parameters."""
+        return bool(self.problem.system.section.conserved)
+
     def tangent(self, matrix: Array, towards: Array) -> Array:
         """The unit tangent of the family, on the side of ``towards``."""
         tangent: Array = np.linalg.svd(matrix)[2][-1]
@@ -124,7 +129,7 @@ class Family:
         quantities = section_quantities(system)(start.states, start.held, parameters)
         at = [system.places[p] for p in self.parameters]
         energy = np.concatenate([quantities.by_states[0][rows], quantities.by_parameters[0][at]])
-        if system.section.conserved:
+        if self.conservative:
             if self._dropped is None:
                 weights = energy[: self._rows] * self._scales[: self._rows]
                 self._dropped = int(np.argmax(np.abs(weights)))

@@ -40,11 +40,14 @@ SYMMETRY_BREAKING, CONTACTS = "symmetry breaking", "contact order"
 SECOND_TOUCHDOWN, REFUTED = "second touchdown", "not a gait"
 GRAZING, NO_FLIGHT = "grazing", "no flight at the apex"
 
-# Natural units; how far beyond a tear to look.
-BEYOND = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+# Natural units; how far beyond a tear to look. Up to the second, what differs is torn and no more.
+BEYOND, NEAR = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 1e-5
 
 # s; over the shortest step of a branch no event moves by as much, unless the motion is torn.
 TORN = 1e-3
+
+# Of its energy; a gait that loses and gains no more keeps it.
+KEPT = 1e-12
 
 # s; a touchdown this soon after the apex is at the apex.
 AT_APEX = 1e-6
@@ -191,7 +194,16 @@ def _vanishing(segment: Segment, test: str) -> Landmark | None:
     where = 1.0 if test == UNIT else -1.0
     if np.abs(multipliers - where).min() > ON_CIRCLE:
         return None
+    if test == UNIT and _keeps_energy(point.gait) and not segment.family.conservative:
+        return None  # conserved energy makes it
     return Landmark(test, f"a multiplier at {where:+.0f}", point)
+
+
+def _keeps_energy(gait: Gait) -> bool:
+    """Whether dampers take and actuators do nothing."""
+    start, end = gait.trajectory.start.states, gait.trajectory.end.states
+    first = gait.model.state_names.index("dissipated_energy")  # works come after it
+    return float(np.abs(end[first:] - start[first:]).max()) <= KEPT * gait.energy
 
 
 def refusal(family: Family, good: BranchPoint, bad: Refuted) -> Landmark:
@@ -220,17 +232,20 @@ def refusal(family: Family, good: BranchPoint, bad: Refuted) -> Landmark:
                 torn = point.gait
         else:
             good, low = point, middle
-    mark = tear(good, just_beyond(family, good, direction)) or tear(good, torn.trajectory)
+    mark = tear_beyond(family, good, direction) or tear(good, torn.trajectory)
     return mark or Landmark(REFUTED, torn.flaw or torn.doubt or "", good)
 
 
-def just_beyond(family: Family, here: BranchPoint, direction: Array) -> Trajectory:
-    """A run from a little further on, far enough not to graze."""
+def tear_beyond(family: Family, here: BranchPoint, direction: Array) -> Landmark | None:
+    """What tears the motion a little further on, far enough not to graze."""
     for step in BEYOND:
         trajectory = family.problem.evaluate(here.point + step * direction).trajectory
-        if trajectory.outcome.kind is not GRAZED:
-            break
-    return trajectory
+        if trajectory.outcome.kind is GRAZED:
+            continue
+        mark = tear(here, trajectory)
+        if mark is not None or step >= NEAR:
+            return mark
+    return None
 
 
 def tear(here: BranchPoint, beyond: Trajectory) -> Landmark | None:

@@ -14,8 +14,9 @@ import numpy as np
 from flexspine.errors import ParameterError
 from flexspine.gaits.family import FOLD, BranchPoint, Family, Refuted
 from flexspine.gaits.gait import Gait
-from flexspine.gaits.landmarks import Landmark, Segment, just_beyond, landmarks, refusal, tear
+from flexspine.gaits.landmarks import Landmark, Segment, landmarks, refusal, tear_beyond
 from flexspine.gaits.newton import Slice, solve
+from flexspine.hybrid.compile import Array
 
 # Natural units along the branch.
 FIRST_STEP = 0.01
@@ -106,7 +107,7 @@ class Tracer:
         try:
             point = family.visit(attempt, here.tangent)
         except ParameterError as failure:
-            return self._shorter(tracing, failure.message)
+            return self._stop_short(tracing, attempt.point, failure.message)
         if isinstance(point, Refuted):
             mark = refusal(family, here, point)
             return _extended(tracing, family, mark.at, marks=(mark,), end=self._told(mark))
@@ -136,13 +137,27 @@ class Tracer:
             return self._shorter(tracing, "the bound could not be reached")
         return _extended(tracing, self.family, edge, end=end)
 
+    def _stop_short(self, tracing: Tracing, beyond: Array, reason: str) -> Tracing:
+        """Land on a bound that was overstepped to where a parameter is not usable."""
+        family, here = self.family, tracing.points[-1]
+        value = family.problem.values(beyond).get(family.over, here.value)
+        if self.low <= value <= self.high:
+            return self._shorter(tracing, reason)
+        bound = self.low if value < self.low else self.high
+        share = (bound - here.value) / (value - here.value)
+        guess = here.point + share * (beyond - here.point)
+        edge = _landed(family, guess, here.tangent, bound)
+        if edge is None:
+            return self._shorter(tracing, "the bound could not be reached")
+        return _extended(tracing, family, edge, end=f"reached {family.over} = {bound:g}")
+
     def _shorter(self, tracing: Tracing, reason: str) -> Tracing:
         """Try again with half the step, or give up and say why."""
         step = tracing.step / 2
         if step >= SHORTEST_STEP:
             return replace(tracing, step=step)
         here = tracing.points[-1]
-        mark = tear(here, just_beyond(self.family, here, here.tangent))
+        mark = tear_beyond(self.family, here, here.tangent)
         if mark is None:
             end = f"no gait found beyond {self.family.over} = {here.value:.6g} ({reason})"
             return replace(tracing, end=end)
@@ -195,17 +210,21 @@ def _closes(points: tuple[BranchPoint, ...], point: BranchPoint) -> bool:
 
 def land(family: Family, segment: Segment, value: float) -> BranchPoint | None:
     """The point of a segment at which ``over`` has a value, if there is one."""
-    first, last, problem = segment.first, segment.last, family.problem
-    share = (value - first.value) / (last.value - first.value)
-    guess = segment.curved(share * segment.length)
+    share = (value - segment.first.value) / (segment.last.value - segment.first.value)
+    return _landed(family, segment.curved(share * segment.length), segment.direction, value)
+
+
+def _landed(family: Family, guess: Array, towards: Array, value: float) -> BranchPoint | None:
+    """The point next to a guess at which ``over`` has a value, if there is one."""
+    problem = family.problem
     if family.over in problem.unknowns:
-        aim = np.zeros(len(guess))
         at = problem.unknowns.index(family.over)
-        aim[at], guess[at] = 1.0, problem.coordinate(family.over, value)
-        attempt = family.correct(guess, Slice(aim, guess))
+        aim, anchor = np.zeros(len(guess)), guess.copy()
+        aim[at], anchor[at] = 1.0, problem.coordinate(family.over, value)
+        attempt = family.correct(anchor, Slice(aim, anchor))
     else:
         attempt = solve(problem.fixing(family.over, value), guess)
     if not attempt.solved:
         return None
-    point = family.visit(attempt, segment.direction)
+    point = family.visit(attempt, towards)
     return point if isinstance(point, BranchPoint) else None
