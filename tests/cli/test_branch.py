@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from flexspine import examine, load_model, trace_branch
 from flexspine.report.branch_figure import plot_branch
 from tests.cli.conftest import COMMAND, Cli
 from tests.cli.test_gait import FIELDS, Found, assert_one_clear_line
+from tests.report.layout import assert_no_text_overlaps
 
 RANGE = ("--from", "3.7", "--to", "4.6")
 
@@ -120,6 +122,93 @@ def test_a_saved_gait_is_followed_in_a_parameter(cli: Cli, traced: Found, tmp_pa
     assert (tmp_path / "results" / "branch.png").exists()
 
 
+DAMPED = (
+    "--over", "spine.damping", "--free", "legs.extension", "--from", "0", "--to", "0.3",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def damped(tmp_path_factory: pytest.TempPathFactory) -> Found:
+    """The published gait over damping, kept going by legs that get longer."""
+    folder = tmp_path_factory.mktemp("damped")
+    done = subprocess.run(
+        [COMMAND, "branch", *DAMPED, "--out", folder, "--json"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    return Found(done, json.loads(done.stdout), folder)
+
+
+def test_a_free_parameter_is_told_for_every_gait(damped: Found) -> None:
+    assert damped.done.returncode == 0, damped.done.stderr
+    assert damped.record["free"] == ["legs.extension"]
+    with (damped.folder / "branch.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(damped.record["points"]) > 6
+    for row, point in zip(rows, damped.record["points"], strict=True):
+        assert point["legs.extension"] == point["parameters"]["legs.extension"]
+        assert float(row["legs.extension"]) == point["legs.extension"]
+        assert point["energy"] == pytest.approx(290, abs=1e-9)
+        work = sum(float(row[f"work.{side}_leg_work.positive"]) for side in ("fore", "hind"))
+        by_hand = work / (2 * 10.4 * 9.81 * float(row["stride_length"]))
+        assert float(row["cost_of_transport"]) == pytest.approx(by_hand, abs=1e-15)
+    thrusts = [point["legs.extension"] for point in damped.record["points"]]
+    assert thrusts[0] == 0
+    assert thrusts == sorted(thrusts)
+
+
+def test_the_figure_has_panels_for_what_is_free_and_what_is_spent(damped: Found) -> None:
+    figure = plot_branch(damped.record)
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert len(labels) == 5
+    assert "leg extension (mm)" in labels
+    assert "cost of transport" in labels
+    drawn = figure.axes[labels.index("leg extension (mm)")].lines[0].get_ydata()
+    last = damped.record["points"][-1]
+    assert drawn[-1] == pytest.approx(1000 * last["legs.extension"])
+    assert_no_text_overlaps(figure)
+
+
+def test_the_summary_tells_what_a_free_parameter_and_its_cost_come_to(
+    cli: Cli, damped: Found
+) -> None:
+    done = cli("branch", *DAMPED)
+    assert done.returncode == 0, done.stderr
+    rows = {line[:22].strip(): line.split() for line in done.stdout.splitlines()}
+    last = damped.record["points"][-1]
+    assert "  free       legs.extension\n" in done.stdout
+    assert rows["legs.extension"][1:3] == ["0", f"{last['legs.extension']:.4g}"]
+    assert rows["cost of transport"][3:5] == ["0", f"{last['cost_of_transport']:.4g}"]
+    assert "peak GRF (N)" in done.stdout
+    assert "spectral radius" in done.stdout
+
+
+def test_an_interrupted_branch_goes_on_with_its_free_parameter(
+    cli: Cli, damped: Found, tmp_path: Path
+) -> None:
+    trace = tmp_path / "results" / "branch.trace.jsonl"
+    trace.parent.mkdir()
+    count = 0
+
+    def stop(_: object) -> None:
+        nonlocal count
+        count += 1
+        if count == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        trace_branch(
+            examine(load_model("kamimura2015-flexible")), "spine.damping", bounds=(0, 0.3),
+            free=("legs.extension",), store=trace, progress=stop,
+        )  # fmt: skip
+    done = cli("branch", *DAMPED, "--out", "results")
+    assert done.returncode == 0
+    assert "going on from" in done.stderr
+    whole, resumed = damped.folder / "branch.json", trace.parent / "branch.json"
+    assert resumed.read_bytes() == whole.read_bytes()
+
+
 def test_a_changed_animal_starts_from_its_own_gait(cli: Cli) -> None:
     done = cli(
         "branch", "--set", "spine.stiffness=255", "--from", "4.499", "--to", "4.501", "--json"
@@ -186,6 +275,8 @@ def test_an_interrupted_branch_is_not_mixed_with_another(cli: Cli, tmp_path: Pat
     assert trace.read_bytes() == before
 
 
+OVER_DAMPING = ["--over", "spine.damping", "--from", "0", "--to", "1"]
+
 BAD = {
     "unknown preset": ([*RANGE, "--preset", "kamimra2015-flexible"], "kamimura2015-flexible"),
     "unknown parameter": ([*RANGE, "--set", "spine.stifness=3"], "spine.stiffness"),
@@ -194,6 +285,14 @@ BAD = {
     "kept and followed": ([*RANGE, "--keep", "mean_speed"], "--keep mean_speed"),
     "too few kept": ([*RANGE, "--keep", "height"], "too few"),
     "not a number": ([*RANGE, "--keep", "energy=nan"], "energy"),
+    "unknown free": ([*RANGE, "--free", "legs.extensin"], "'legs.extension'"),
+    "free and followed": ([*OVER_DAMPING, "--free", "spine.damping"], "name it once"),
+    "free twice": ([*OVER_DAMPING, *["--free", "legs.extension"] * 2], "name it once"),
+    "two free": (
+        [*OVER_DAMPING, "--free", "legs.extension", "--free", "legs.stiffening"], "fewer",
+    ),
+    "damped and nothing free": (OVER_DAMPING, "such as legs.extension"),
+    "a damped animal": ([*RANGE, "--set", "spine.damping=1"], "flexspine gait --free"),
     "no end": (["--from", "3.7"], "--to"),
     "turned around": (["--from", "4.6", "--to", "3.7"], "low before high"),
     "without the gait": (["--from", "3.7", "--to", "4"], "4.5"),
@@ -201,7 +300,7 @@ BAD = {
     "absent gait": ([*RANGE, "--gait", "absent.json"], "absent.json"),
     "two animals": ([*RANGE, "--gait", "absent.json", "--preset", "slip"], "--preset"),
     "a changed gait": ([*RANGE, "--gait", "absent.json", "--set", "gravity=9"], "--set"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -195,6 +195,26 @@ def test_a_parameter_can_be_the_unknown(cli: Cli) -> None:
     assert any(stiffness == pytest.approx(260, abs=1e-6) for stiffness in stiffnesses)
 
 
+def test_a_damped_gait_is_found_with_what_keeps_it_going(cli: Cli, tmp_path: Path) -> None:
+    """Next to the published one; what it spends is what the damper takes."""
+    done = cli(
+        "gait", "--set", "spine.damping=1", "--free", "legs.extension=0:0.01",
+        "--within", "touchdown.fore=0.44:0.49", "--within", "touchdown.hind=0.54:0.6",
+        "--within", "fore_pitch=0.06:0.12", "--within", "hind_pitch=-0.12:-0.06",
+        "--starts", "4", "--out", "damped",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    record = json.loads((tmp_path / "damped" / "gaits.json").read_text())
+    assert record["free"] == ["legs.extension"]
+    (gait,) = record["gaits"]
+    run = json.loads(cli("bound", "--gait", "damped/gait-1.json", "--json").stdout)
+    assert run["energy"]["relative_drift"] < 1e-12
+    assert run["apexes"][-1]["height"] == pytest.approx(0.32, abs=1e-10)
+    for told in (gait["parameters"]["legs.extension"], gait["cost_of_transport"]):
+        assert told > 0
+        assert f"{told:.8g}" in done.stdout
+
+
 BAD = {
     "unknown preset": (["--preset", "kamimra2015-flexible"], "kamimura2015-flexible"),
     "unknown parameter": (["--set", "spine.stifness=3"], "spine.stiffness"),

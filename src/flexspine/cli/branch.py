@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 TRACE = "branch.trace.jsonl"
 
+# Smaller numbers are told as zero.
+ROUNDING = 1e-12
+
 
 def branch(
     low: Annotated[float, typer.Option("--from", help="Where to stop on the lower side (SI).")],
@@ -50,6 +53,14 @@ def branch(
             metavar="NAME",
             help="A quantity to keep, as NAME or NAME=VALUE (default: energy, height and "
             "mean_speed, without what is followed).",
+        ),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A parameter that may change as well, such as legs.extension to make good what "
+            "dampers take.",
         ),
     ] = None,
     symmetric: Symmetric = None,
@@ -76,6 +87,8 @@ def branch(
         flexspine branch --gait results/gait-1.json --over spine.stiffness --from 200 --to 300
 
         flexspine branch --over energy --keep height --keep mean_speed=4.4 --from 280 --to 300
+
+        flexspine branch --over spine.damping --free legs.extension --from 0 --to 8
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.gaits.continuation import trace_branch
@@ -101,6 +114,7 @@ def branch(
                 over,
                 bounds=(low, high),
                 fixed=fixed,
+                free=tuple(free or ()),
                 symmetric=symmetric,
                 longest_step=step,
                 store=store,
@@ -221,13 +235,16 @@ def _report(record: dict[str, Any], start: str) -> str:
     over, points = record["over"], record["points"]
     along = [point[over] for point in points]
     kept = ", ".join(f"{name} = {value:.9g}" for name, value in record["fixed"].items())
+    freed = ", ".join(record["free"])
     lines = [
         f"{points[0]['preset']}: {len(points)} {'symmetric' if record['symmetric'] else 'general'} "
         f"gaits along {over}, from {min(along):.6g} to {max(along):.6g}",
         f"  kept       {kept}",
+        *([f"  free       {freed}"] if freed else []),
         f"  start      {start}",
         f"  one end    {record['ends'][0]}",
         f"  other end  {record['ends'][1]}",
+        *_table(over, points, record["free"]),
     ]
     if record["landmarks"]:
         lines.append("  landmarks, in order along the branch:")
@@ -236,3 +253,24 @@ def _report(record: dict[str, Any], start: str) -> str:
             for mark in record["landmarks"]
         ]
     return "\n".join(lines)
+
+
+def _table(over: str, points: list[dict[str, Any]], free: list[str]) -> list[str]:
+    """What free parameters, peak forces, cost and stability are along the branch."""
+    rows = [(name, [point[name] for point in points]) for name in free]
+    peaks = [max(point["peak_grf"].values()) for point in points]
+    rows.append(("peak GRF (N)", peaks))
+    if any(point["work"] for point in points):
+        costs = [point["cost_of_transport"] for point in points]
+        rows.append(("cost of transport", costs))
+    level = "" if points[0]["energy_identity"] is None else " on the energy level"
+    radii = [point["level_spectral_radius"] for point in points]
+    rows.append((f"spectral radius{level}", radii))
+    width = max(len(name) for name, _ in rows)
+    lines = [f"  {'':{width}}  {'one end':>10}  {'other end':>10}  lowest            highest"]
+    for name, values in rows:
+        turns = (pick(range(len(values)), key=values.__getitem__) for pick in (min, max))
+        shown = [f"{0 if abs(value) < ROUNDING else value:.4g}" for value in values]
+        told = "".join(f"{f'{shown[i]} at {points[i][over]:.4g}':<18}" for i in turns)
+        lines.append(f"  {name:{width}}  {shown[0]:>10}  {shown[-1]:>10}  {told}".rstrip())
+    return lines

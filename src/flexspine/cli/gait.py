@@ -56,7 +56,8 @@ def gait(
         list[str] | None,
         typer.Option(
             metavar="NAME=LOW:HIGH",
-            help="Let a parameter be unknown, within bounds, e.g. spine.stiffness=200:300.",
+            help="Let a parameter be unknown, within bounds, e.g. spine.stiffness=200:300, or "
+            "legs.extension=0:0.02 to make good what dampers take.",
         ),
     ] = None,
     within: Annotated[
@@ -89,6 +90,8 @@ def gait(
         flexspine gait --set spine.stiffness=240 --symmetric --out results
 
         flexspine gait --energy 290 --fix height=0.32 --fix touchdown.fore=0.46 --json
+
+        flexspine gait --set spine.damping=1 --free legs.extension=0:0.02 --out results
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.gaits.gait_record import gait_record
@@ -119,6 +122,7 @@ def gait(
             "schema_version": SCHEMA_VERSION,
             "preset": model.name,
             "fixed": fixed,
+            "free": list(freed),
             "gaits": [gait_record(gait) for gait in found],
             "advice": found.advice,
             "tally": dict(found.tally),
@@ -176,7 +180,7 @@ def _freed(model: Model, free: list[str] | None) -> dict[str, tuple[float, float
     for name, ends in ranges.items():
         for end in ends:
             model.with_values({name: end})
-        if ends[0] <= 0 < values(model.parameters)[name]:
+        if ends[0] <= 0 < values(model.parameters)[name] and name not in model.may_vanish:
             raise ParameterError(
                 f"--free {name} from {ends[0]:g} on would let it vanish", "give a LOW above zero"
             )
@@ -221,10 +225,27 @@ def _report(record: dict[str, Any]) -> str:
     lines += [
         "",
         f"The spectral radius is that of the stride map{level}, at fixed touchdown angles.",
+        *_unknowns(record),
     ]
     for number, gait in enumerate(gaits, 1):
         lines += ["", *_multipliers(number, gait)]
     return "\n".join([*lines, "", record["advice"]])
+
+
+def _unknowns(record: dict[str, Any]) -> list[str]:
+    """What free parameters have become, and what is spent."""
+    gaits, rows = record["gaits"], []
+    for name in record["free"]:
+        rows.append((name, [gait["parameters"][name] for gait in gaits]))
+    if any(gait["work"] for gait in gaits):
+        rows.append(("cost of transport", [gait["cost_of_transport"] for gait in gaits]))
+    if not rows:
+        return []
+    head = "".join(f"  {name:>17}" for name, _ in rows)
+    lines = ["", f"  #{head}"]
+    for number, values in enumerate(zip(*(found for _, found in rows), strict=True), 1):
+        lines.append(f"{number:3}" + "".join(f"  {value:17.8g}" for value in values))
+    return lines
 
 
 def _multipliers(number: int, gait: dict[str, Any]) -> list[str]:

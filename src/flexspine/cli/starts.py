@@ -73,6 +73,12 @@ def starting_gait(
     own = own_gait(name, "find one with 'flexspine gait --out' and give it with --gait")
     if model.parameters == own.model.parameters:
         return own
+    if not model.features.conservative:
+        raise ParameterError(
+            f"'{name}' with dampers or actuators has no gait of its own to start from",
+            "find one with 'flexspine gait --free legs.extension=0:0.02 --out' and give it with "
+            "--gait",
+        )
     progress.begin("looking for the gait to start from")
     found = find_gaits(model, own.quantities, symmetric=symmetric, progress=progress.at)
     if not found.gaits:

@@ -68,15 +68,21 @@ def gait_record(gait: Gait, stability: Stability | None = None) -> dict[str, Any
 
 
 def branch_record(branch: Branch) -> dict[str, Any]:
-    """Return a branch: its points as gaits, what happens on it, why it ends."""
+    """Return a branch: its points as gaits, what happens on it, why it ends.
+
+    Each point names the value of what the branch is followed in and those of free parameters.
+    """
 
     def record(point: BranchPoint) -> dict[str, Any]:
-        return {branch.over: point.value, **gait_record(point.gait, point.stability)}
+        numbers = point.gait.model.numbers
+        freed = {name: numbers[name] for name in branch.free}
+        return {branch.over: point.value, **freed, **gait_record(point.gait, point.stability)}
 
     return {
         "schema_version": SCHEMA_VERSION,
         "over": branch.over,
         "fixed": dict(branch.family.problem.fixed),
+        "free": list(branch.free),
         "symmetric": branch.family.problem.symmetric,
         "ends": list(branch.ends),
         "landmarks": [

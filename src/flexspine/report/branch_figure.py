@@ -1,4 +1,7 @@
-"""A branch of gaits: peak forces, stability and touchdown angles over what is followed."""
+"""A branch of gaits: peak forces, stability and touchdown angles over what is followed.
+
+Where actuators work, what is spent; where further parameters are free, what they are.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +25,7 @@ from flexspine.gaits.landmarks import (
     SECOND_TOUCHDOWN,
     SYMMETRY_BREAKING,
 )
-from flexspine.models.dataset import VARIABLES
-from flexspine.models.registry import find_kind
-from flexspine.parameters import quantities
+from flexspine.report.branch_axis import NAMES, Axis, axis_of, spread
 from flexspine.report.caption import SIDES, joined, of_legs
 from flexspine.report.style import (
     FAINT,
@@ -32,8 +33,11 @@ from flexspine.report.style import (
     INK,
     LINE,
     MARKS,
+    ORANGE,
+    PURPLE,
     SIDE_COLORS,
     SMALL_SIZE,
+    add_legend,
     add_title,
     themed,
 )
@@ -58,17 +62,6 @@ KINDS = (
     REFUTED,
 )
 
-NAMES = {
-    "mean_speed": ("mean speed", "m/s"),
-    "energy": ("total energy", "J"),
-    "height": ("apex height", "m"),
-    "speed": ("apex speed", "m/s"),
-    "spine.stiffness": ("spine stiffness $k_t$", "N m/rad"),
-    "fore.leg.stiffness": ("fore leg stiffness $k_l$", "N/m per leg pair"),
-    "hind.leg.stiffness": ("hind leg stiffness $k_l$", "N/m per leg pair"),
-    **{f"touchdown.{side}": (f"{side} touchdown angle", "rad") for side in SIDES},
-}
-
 # Forces of both ends that differ by less, relatively, are drawn as one curve.
 EQUAL = 1e-6
 
@@ -82,8 +75,9 @@ LETTERS = 105
 # Values of one kind of landmark that are listed.
 MOST_VALUES = 8
 
-# in; of a letter of small type, and of a panel.
+# in; of a letter of small type, and of a panel; how high three panels are, and any further one.
 LETTER, PANEL = 0.066, 5.9
+THREE, FURTHER = 6.6, 1.75
 
 
 class Curve(NamedTuple):
@@ -95,38 +89,31 @@ class Curve(NamedTuple):
     dashed: bool = False
 
 
-class Axis(NamedTuple):
-    """The quantity that a branch is followed in, as people read it."""
-
-    name: str
-    label: str
-    unit: str
-
-    def of(self, gait: Record) -> float:
-        """Its value for a gait."""
-        return self.shown(gait[self.name])
-
-    def shown(self, value: float) -> float:
-        """An SI value in ``unit``."""
-        return degrees(value) if self.unit == "°" else value
-
-
 def plot_branch(record: Record) -> Figure:
-    """Draw a branch, as `branch_record` gives it: peak GRF, stability and touchdown angles."""
+    """Draw a branch, as `branch_record` gives it: peak GRF, stability and touchdown angles.
+
+    Cost of transport and free parameters have their panels where there are any.
+    """
     with themed():
         points = record["points"]
-        axis = _axis(record["over"], points[0]["model"])
+        axis = axis_of(record["over"], points[0]["model"])
         details, key = _details(record, axis), _key(record, axis)
+        spent = any(gait["work"] for gait in points)
+        extra = len(record["free"]) + spent
         height = 0.38 + LINE * (len(details) + sum(1 + text.count("\n") for text in key))
-        figure = Figure(figsize=(7.4, 6.6 + height), layout="constrained")
-        panels = forces, radius, angles = figure.subplots(
-            3, 1, sharex=True, height_ratios=[1.2, 1, 1]
-        )
+        figure = Figure(figsize=(7.4, THREE + FURTHER * extra + height), layout="constrained")
+        panels = figure.subplots(3 + extra, 1, sharex=True, height_ratios=[1.2, *[1] * (2 + extra)])
+        forces, *further, radius, angles = panels
+        spread(angles, [axis.of(gait) for gait in points])
         _draw(forces, _forces(forces, points), record, axis)
+        for axes, name in zip(further, record["free"], strict=False):
+            _draw(axes, [_free(axes, axis_of(name, points[0]["model"]))], record, axis)
+        if spent:
+            _draw(further[-1], [_cost(further[-1])], record, axis)
         _draw(radius, [_radius(radius, points)], record, axis)
         _draw(angles, _angles(angles), record, axis)
         _name_ends(forces, record, axis)
-        angles.set_xlabel(f"{axis.label} ({axis.unit})")
+        angles.set_xlabel(axis.told)
         figure.align_ylabels(panels)
         figure.legend(
             [Line2D([], [], **look) for look in key.values()], list(key),
@@ -136,35 +123,26 @@ def plot_branch(record: Record) -> Figure:
     return figure
 
 
-def _axis(name: str, model: str) -> Axis:
-    label, unit = _described(name, model)
-    return Axis(name, label, "°" if unit == "rad" else unit)
-
-
-def _described(name: str, model: str) -> tuple[str, str]:
-    """What people call a quantity or parameter, and its unit."""
-    if name in NAMES:
-        return NAMES[name]
-    if name in VARIABLES:
-        return f"{name.replace('_', ' ')} at the apex", VARIABLES[name][0]
-    units = {item.name: item.unit for item in quantities(find_kind(model).parameters)}
-    return name.replace(".", " ").replace("_", " "), units[name]
-
-
 def _details(record: Record, axis: Axis) -> list[str]:
     """What a reader must know: what is kept, and the stiffnesses."""
     gait, kept = record["points"][0], []
     for name, value in record["fixed"].items():
-        one = _axis(name, gait["model"])
+        one = axis_of(name, gait["model"])
         kept.append(f"{one.label} {one.shown(value):.6g} {one.unit}".replace(" °", "°"))
-    given = {name: value for name, value in gait["parameters"].items() if name != axis.name}
+    changing = (axis.name, *record["free"])
+    given = {name: value for name, value in gait["parameters"].items() if name not in changing}
     parts = [f"{'symmetric' if record['symmetric'] else 'general'} gaits"]
     parts += [f"kept: {', '.join(kept)}"] if kept else []
+    freed = [axis_of(name, gait["model"]).label for name in record["free"]]
+    parts += [f"free: {', '.join(freed)}"] if freed else []
     both = of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     for name in ("spine.stiffness", "fore.leg.stiffness", "hind.leg.stiffness"):
         if name in given and not (both and "leg" in name):
             label, unit = NAMES[name]
             parts.append(f"{label} = {given[name]:g} {unit}")
+    if given.get("spine.damping"):
+        label, unit = NAMES["spine.damping"]
+        parts.append(f"{label} = {given['spine.damping']:g} {unit}")
     return joined([*parts, *both])
 
 
@@ -180,6 +158,19 @@ def _forces(axes: Axes, points: list[Record]) -> list[Curve]:
 def _peak(gait: Record, side: str) -> float:
     """The peak force, NaN for a gait on the brink that could not be run as far as its peak."""
     return float(gait["peak_grf"][side]) if gait["confirmed"] else nan
+
+
+def _free(axes: Axes, axis: Axis) -> Curve:
+    """The curve of a free parameter."""
+    axes.set_ylabel(axis.told)
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+    return Curve(axis.of, PURPLE)
+
+
+def _cost(axes: Axes) -> Curve:
+    axes.set_ylabel("cost of transport")
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+    return Curve(lambda gait: gait["cost_of_transport"] if gait["confirmed"] else nan, ORANGE)
 
 
 def _radius(axes: Axes, points: list[Record]) -> Curve:
@@ -234,7 +225,8 @@ def _draw(axes: Axes, curves: list[Curve], record: Record, axis: Axis) -> None:
         axes.axvline(end, color=FAINT, linewidth=0.8, linestyle=":", zorder=1)
     axes.yaxis.grid(True, color=FAINT, alpha=0.25, linewidth=0.5)
     axes.margins(y=0.12)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.6, handlelength=1.6)
+    if axes.get_legend_handles_labels()[0]:
+        add_legend(axes)
 
 
 STABLE: dict[str, Any] = {
@@ -259,7 +251,8 @@ def _key(record: Record, axis: Axis) -> dict[str, dict[str, Any]]:
     """What marks look like by what they mean: where landmarks of a kind are, and what."""
     key = {}
     if any(gait["stable"] for gait in record["points"]):
-        key["stable: small deviations at this energy die out"] = STABLE
+        level = "" if record["points"][0]["energy_identity"] is None else " at this energy"
+        key[f"stable: small deviations{level} die out"] = STABLE
     for kind in KINDS:
         marks = [mark for mark in record["landmarks"] if mark["kind"] == kind]
         if marks:
@@ -280,13 +273,15 @@ def _told(marks: list[Record], axis: Axis) -> str:
 def _name_ends(axes: Axes, record: Record, axis: Axis) -> None:
     """Say above the panel why the branch ends where it does."""
     ends = [axis.of(record["points"][at]) for at in (0, -1)]
-    low, high = axes.get_xlim()
+    even = axes.xaxis.get_transform().transform
+    low, high = even(axes.get_xlim())
     told = sorted(zip(ends, map(_brief, record["ends"]), strict=True))
     if told[0][1] == told[1][1] and isclose(told[0][0], told[1][0]):
         told = [(told[0][0], f"both {told[0][1].replace('ends', 'end')}")]
-    rights = [(end - low) / (high - low) > 0.5 for end, _ in told]
+    shares = [float(even(end) - low) / (high - low) for end, _ in told]
+    rights = [share > 0.5 for share in shares]
     length = LETTER * sum(len(text) + 2 for _, text in told)
-    apart = (told[-1][0] - told[0][0]) / (high - low) * PANEL
+    apart = (shares[-1] - shares[0]) * PANEL
     aside = rights == [False, True] and length < apart
     for row, ((end, text), right) in enumerate(zip(told, rights, strict=True)):
         axes.annotate(
