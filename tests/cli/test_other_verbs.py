@@ -103,18 +103,23 @@ def test_a_full_disk_is_exit_code_3_and_keeps_older_results(
 
 
 def test_the_study_writes_tables_figures_and_verdicts(cli: Cli, tmp_path: Path) -> None:
-    """In small: one stiffness, one speed for the sweeps."""
-    small = ("--stiffness", "260", "--compare", "4.5", "--speeds", "4.3:4.7")
+    """In small: one stiffness, one speed for the sweeps, one damping."""
+    small = ("--stiffness", "260", "--compare", "4.5", "--speeds", "4.3:4.7", "--damping", "2")
     result = cli("study", *small, "--out", "results", "--json")
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
     record = json.loads(result.stdout)
-    assert [verdict["claim"] for verdict in record["verdicts"]] == [*range(1, 8), 9, 10, 11, 12]
+    assert [verdict["claim"] for verdict in record["verdicts"]] == [*range(1, 13)]
+    assert {branch["actuator"] for branch in record["damped"]} == {
+        "legs.extension", "legs.stiffening", "legs.hip_lever",
+    }  # fmt: skip
+    assert record["damped"][-1]["spine.damping"] == pytest.approx(2)
     out = tmp_path / "results"
-    for name in ("gaits", "stiffness", "landmarks"):
+    for name in ("gaits", "stiffness", "damping", "landmarks"):
         assert (out / f"{name}.csv").stat().st_size > 0
         assert (out / f"{name}.parquet").stat().st_size > 0
     assert {path.name for path in out.glob("*.png")} == {
+        "damping.png",
         "energy_shares.png",
         "peak_grf_over_speed.png",
         "peak_grf_over_stiffness.png",
@@ -137,6 +142,7 @@ def test_the_study_writes_tables_figures_and_verdicts(cli: Cli, tmp_path: Path) 
         (("--speeds", "4.6:4.2"), "--speeds"),
         (("--speeds", "fast"), "--speeds"),
         (("--energy", "500"), "energy"),
+        (("--damping", "0"), "damping"),
         (("--stiffness", "1e5"), "k_t"),
     ],
 )

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from flexspine.gaits.continuation import Branch
+    from flexspine.studies.damping import DampingStudy
     from flexspine.studies.spines import Setting, SpineStudy
     from flexspine.studies.verdict import Verdict
 
@@ -50,6 +51,13 @@ def study(
             "(default 4.0, 4.25, 4.5)."
         ),
     ] = None,
+    damping: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Spine damping in N m s/rad of sweeps over stiffness that tell what compliance "
+            "costs; repeat it (default 0.1, 1)."
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write tables, figures and verdicts into this directory.")
     ] = None,
@@ -57,8 +65,9 @@ def study(
 ) -> int:
     """Compare bounding with a rigid, a locked and a flexible spine, and judge the published claims.
 
-    Follows the gaits of each body over mean speed, and over spine stiffness at fixed speeds. With
-    --out, a study that was interrupted goes on where it was when the same command is given again.
+    Follows the gaits of each body over mean speed, and over spine stiffness at fixed speeds; damped
+    ones, kept going by an actuator, over damping and over stiffness. With --out, a study that was
+    interrupted goes on where it was when the same command is given again.
     Units are SI and radians. Exit code 0: done; 2: bad input; 3: the machine failed;
     130: interrupted.
 
@@ -69,6 +78,8 @@ def study(
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.studies.claims import verdicts
+    from flexspine.studies.damping import DampedSetting, study_damping
+    from flexspine.studies.damping_claims import damping_verdict
     from flexspine.studies.robot_claims import robot_verdicts
     from flexspine.studies.spines import Setting, study_spines
 
@@ -81,6 +92,7 @@ def study(
         stiffnesses=tuple(stiffness or usual.stiffnesses),
         compared=tuple(compare or usual.compared),
     )
+    damped = DampedSetting(dampings=tuple(damping or DampedSetting().dampings))
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
@@ -91,13 +103,14 @@ def study(
             stack.callback(_remove_empty, store)
         try:
             result = study_spines(setting, store, partial(_show, progress))
+            damping_result = study_damping(result, damped, store, partial(_show, progress))
             progress.begin("judging the claims")
-            judged = verdicts(result)
+            judged = [*verdicts(result), damping_verdict(damping_result)]
             progress.begin("judging the claims about the articulated robot")
-            judged += robot_verdicts()
+            judged = sorted([*judged, *robot_verdicts()], key=lambda verdict: verdict.number)
             if directory is not None and store is not None:
                 with directory.stage(SAVED) as stage:
-                    _write(stage, result, judged, progress)
+                    _write(stage, result, damping_result, judged, progress)
                 shutil.rmtree(store)
         except ParameterError:
             if store is not None and not begun:  # what was begun before is none of this study's
@@ -111,7 +124,7 @@ def study(
                 )
             raise
     if json:
-        print_json(_record(result, judged))
+        print_json(_record(result, damping_result, judged))
     else:
         print(_report(judged))
         if out is not None:
@@ -129,23 +142,32 @@ def _remove_empty(store: Path) -> None:
         store.rmdir()
 
 
-def _write(stage: Path, result: SpineStudy, judged: list[Verdict], progress: Steps) -> None:
+def _write(
+    stage: Path,
+    result: SpineStudy,
+    damping: DampingStudy,
+    judged: list[Verdict],
+    progress: Steps,
+) -> None:
     from flexspine.cli.results import write_json
     from flexspine.gaits.files import save_gait
     from flexspine.models.dataset import to_dataset
     from flexspine.report import study_figures as figures
+    from flexspine.report.damping_figure import plot_damping
     from flexspine.studies import tables
 
     progress.begin("writing tables")
     gaits, stiffness = tables.gaits_table(result), tables.stiffness_table(result)
+    damped = tables.damping_table(damping)
     for name, rows in (
         ("gaits", gaits),
         ("stiffness", stiffness),
-        ("landmarks", tables.landmarks_table(result)),
+        ("damping", damped),
+        ("landmarks", tables.landmarks_table(result, damping)),
     ):
         for suffix in ("csv", "parquet"):
             tables.write_table(rows, stage / f"{name}.{suffix}")
-    write_json(_record(result, judged), stage / "study.json")
+    write_json(_record(result, damping, judged), stage / "study.json")
     (stage / "verdicts.md").write_text(_markdown(result.setting, judged), encoding="utf-8")
     compared = sorted(set(result.setting.compared))
     quoted = {name: gait for verdict in judged for name, gait in verdict.runs.items()}
@@ -167,6 +189,8 @@ def _write(stage: Path, result: SpineStudy, judged: list[Verdict], progress: Ste
             "stability_over_stiffness": lambda: figures.plot_stability_stiffness(stiffness),
             "peak_grf_over_stiffness": lambda: figures.plot_peak_grf_stiffness(stiffness),
         }
+    if damped:
+        drawings["damping"] = lambda: plot_damping(damped)
     if profiles:
         fastest = max(speed for _, speed in profiles)
         drawings |= {
@@ -182,7 +206,7 @@ def _file(name: str) -> str:
     return f"gait-{name}.json"
 
 
-def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
+def _record(result: SpineStudy, damping: DampingStudy, judged: list[Verdict]) -> dict[str, Any]:
     setting = result.setting
     return {
         "schema_version": SCHEMA_VERSION,
@@ -227,6 +251,16 @@ def _record(result: SpineStudy, judged: list[Verdict]) -> dict[str, Any]:
             }
             for sweep in result.sweeps
         ],
+        "damped": [
+            {
+                "mean_speed": damped.speed,
+                "actuator": damped.actuator,
+                damped.other: damped.kept,
+                "gaits": len(damped.branch.points),
+                "ends": _ends(damped.branch),
+            }
+            for damped in (*damping.over_damping, *damping.over_stiffness)
+        ],
     }
 
 
@@ -242,10 +276,10 @@ def _markdown(setting: Setting, judged: list[Verdict]) -> str:
     lines = [
         "# Verdicts",
         "",
-        f"Energy {setting.energy:g} J, apex height {setting.height:g} m. Symmetric gaits that land "
-        "on the fore leg first. Peak GRF is the largest magnitude of the leg force, per pair of "
-        "legs; k_t is on the relative angle. Two baselines: the rigid body as published, and the "
-        "flexible body with its spine locked.",
+        f"Energy {setting.energy:g} J, apex height {setting.height:g} m. Gaits that land on the "
+        "fore leg first, symmetric but for damped ones. Peak GRF is the largest magnitude of the "
+        "leg force, per pair of legs; k_t is on the relative angle. Two baselines: the rigid body "
+        "as published, and the flexible body with its spine locked.",
         "",
     ]
     for verdict in judged:
@@ -255,7 +289,10 @@ def _markdown(setting: Setting, judged: list[Verdict]) -> str:
             lines += [f"Repeated by `{verdict.command}`.", ""]
             continue
         runs = ", ".join(f"`{_file(name)}`" for name in verdict.runs) or "none"
-        lines += [f"Gaits quoted: {runs}; all are in `gaits.csv` and `stiffness.csv`.", ""]
+        lines += [
+            f"Gaits quoted: {runs}; all are in `gaits.csv`, `stiffness.csv` and `damping.csv`.",
+            "",
+        ]
     return "\n".join(lines)
 
 

@@ -116,7 +116,7 @@ def plot_stability_speed(rows: Sequence[Row], *, leg_stiffness: float = LEG_STIF
     """Draw the spectral radius on the energy level over mean speed, from the table of gaits."""
     with themed():
         bodies = _bodies(rows)
-        key = {"thick: stable": {"color": FAINT, **STABLE}, LIMIT_NAME: LIMIT}
+        key = {STABLE_NAME: {"color": FAINT, **STABLE}, LIMIT_NAME: LIMIT}
         figure, panels = _over_speed(RADIUS, rows, bodies, key, leg_stiffness)
         for axes in panels:
             for body in bodies:
@@ -164,6 +164,7 @@ RADIUS = Measure(
 
 READING_NAME = f"reading of Kamimura et al. 2015, Fig. 4: ±{PEAK_ERROR:g} N, ±{SPEED_ERROR:g} m/s"
 LIMIT_NAME = "limit of stability: stable below 1"
+STABLE_NAME = "thick: stable"
 END_NAME = "end of a branch, as far as followed"
 
 
@@ -220,7 +221,7 @@ def _over_speed(
     """Draw a measure of every body over mean speed, and the fast end once more."""
     lines = {body.label: {"color": body.color} for body in bodies}
     key = {**lines, **more, END_NAME: {**END, "markeredgecolor": INK}}
-    parts = [*_setting(rows, leg_stiffness), measure.meaning]
+    parts = [*setting_of(rows, leg_stiffness), measure.meaning]
     figure = start_figure(f"{measure.name} over mean speed", parts, ONE_ROW, key)
     whole, part = panels = figure.subplots(1, 2, width_ratios=[1.45, 1])
     for axes in panels:
@@ -258,7 +259,7 @@ def _over_stiffness(
     """Draw a measure over spine stiffness, one column a speed, and the branches once more."""
     looks = {row["kind"]: _look(row) for row in rows}
     key = {**looks, **more, END_NAME: {**END, "markeredgecolor": INK}}
-    parts = [*_setting(rows, leg_stiffness), measure.meaning]
+    parts = [*setting_of(rows, leg_stiffness), measure.meaning]
     figure = start_figure(f"{measure.name} over spine stiffness", parts, TWO_ROWS, key)
     speeds = sorted({float(row["speed"]) for row in rows})
     panels = figure.subplots(2, len(speeds), sharex="row", sharey=True, squeeze=False)
@@ -333,7 +334,7 @@ def _label_logarithmic(axis: Axis, limits: tuple[float, float]) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def _setting(rows: Sequence[Row], leg_stiffness: float) -> list[str]:
+def setting_of(rows: Sequence[Row], leg_stiffness: float) -> list[str]:
     """What all gaits share, and what the stiffnesses are of."""
     if not rows:
         raise InputError("the table has no rows", "give one with a gait at least")

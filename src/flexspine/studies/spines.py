@@ -115,6 +115,11 @@ class SpineStudy:
         """The specimens that bend, softest first."""
         return tuple(s for s in self.specimens if s.stiffness is not None)
 
+    def stiffest_at(self, speed: float) -> BranchPoint | None:
+        """The gait of the stiffest spine that runs at a mean speed."""
+        found = (point for s in reversed(self.flexible) if (point := s.at(speed)) is not None)
+        return next(found, None)
+
 
 def study_spines(
     setting: Setting,
@@ -214,13 +219,13 @@ def _sweep(
 ) -> StiffnessSweep | None:
     """Follow the stiffest specimen that runs at this speed over all stiffnesses."""
     setting = study.setting
-    starts = [p for s in reversed(study.flexible) if (p := s.at(speed)) is not None]
-    if not starts:
+    start = study.stiffest_at(speed)
+    if start is None:
         return None
     bounds = (setting.softest, setting.stiffest)
-    branch = trace(starts[0].gait, "spine.stiffness", bounds, f"over stiffness at {speed:g}")
+    branch = trace(start.gait, "spine.stiffness", bounds, f"over stiffness at {speed:g}")
     locked = study.specimen(LOCKED).at(speed)
-    stiff = () if locked is None else tuple(_stiff(starts[0].gait.model, locked.gait, setting))
+    stiff = () if locked is None else tuple(_stiff(start.gait.model, locked.gait, setting))
     return StiffnessSweep(speed, branch, stiff, locked)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from flexspine.gaits.gait import ENERGIES, Gait
 from flexspine.gaits.stability import Stability
 from flexspine.models.legs import SIDES
+from flexspine.studies.damping import DAMPING, STIFFNESS, DampingStudy, cost
 from flexspine.studies.spines import FLEXIBLE, LOCKED, SpineStudy
 
 Row = dict[str, Any]
@@ -87,10 +88,37 @@ def stiffness_table(study: SpineStudy) -> list[Row]:
     return rows
 
 
-def landmarks_table(study: SpineStudy) -> list[Row]:
+def damping_table(study: DampingStudy) -> list[Row]:
+    """The measured gaits of damped spines, in order along each branch.
+
+    ``amplitude`` is the actuator's, in m or as a share of leg stiffness; work in J per stride.
+    """
+    rows: list[Row] = []
+    for damped in (*study.over_damping, *study.over_stiffness):
+        for position, point in enumerate(damped.points):
+            numbers, work = point.gait.model.numbers, point.gait.summary.work.values()
+            head = {
+                "over": damped.branch.over,
+                "speed": damped.speed,
+                "actuator": damped.actuator,
+                "position": position,
+                "spine_stiffness": numbers[STIFFNESS],
+                "spine_damping": numbers[DAMPING],
+                "amplitude": numbers[damped.actuator],
+                "cost_of_transport": cost(point.gait),
+                "positive_work": sum(each.positive for each in work),
+                "net_work": sum(each.net for each in work),
+            }
+            rows.append({**head, **gait_row(point.gait, point.stability)})
+    return rows
+
+
+def landmarks_table(study: SpineStudy, damping: DampingStudy | None = None) -> list[Row]:
     """What happens on every branch, and why it ends."""
     branches = [(s.label, s.branch) for s in study.specimens]
     branches += [(f"{FLEXIBLE}, {w.speed:g} m/s", w.branch) for w in study.sweeps]
+    damped = (*damping.over_damping, *damping.over_stiffness) if damping else ()
+    branches += [(each.label, each.branch) for each in damped]
     rows: list[Row] = []
     for label, branch in branches:
         rows += [
