@@ -30,7 +30,7 @@ pictures: $(VENV)/.installed
 	$(BIN)/python -c "from flexspine import load_robot, plot_coordinates as p; p(load_robot('sc618')).savefig('docs/images/sc618_coordinates.png')"
 	mkdir -p docs/images
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
-	cp $(OUT)/pictures/study/peak_grf_over_speed.png docs/images/
+	cp $(OUT)/pictures/study/peak_grf_over_speed.png $(OUT)/pictures/study/damping.png docs/images/
 	cp $(OUT)/pictures/trot/figure.png docs/images/trot.png
 	cp $(OUT)/pictures/trot/animation.gif docs/images/trot.gif
 	cp $(OUT)/pictures/basin/basin.png $(OUT)/pictures/map/map.png docs/images/
