@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -199,3 +199,12 @@ def _explained(failure: ValidationError, declared: Mapping[str, Quantity]) -> Pa
         f"parameter '{name}' = {shortened(fault['input'])} is not usable",
         f"give a number in {about.told} ({about.meaning})",
     )
+
+
+def check_seed(seed: Any) -> int:
+    """Return a seed as a whole number. Raises `ParameterError` for anything but one from 0 on."""
+    if not (isinstance(seed, Integral) and not isinstance(seed, bool) and int(seed) >= 0):
+        raise ParameterError(
+            f"seed = {shortened(seed)} is not usable", "give a whole number from 0 on"
+        )
+    return int(seed)

@@ -70,6 +70,8 @@ def test_a_push_too_hard_is_told_and_exits_with_1(cli: Cli) -> None:
         (("control", "--method", "pid"), "pid"),
         (("control", "--effort", "0"), "effort"),
         (("control", "--push", "nan"), "--push"),
+        (("control", "--effort", "inf"), "effort"),
+        (("control", "--sensing", "1e308"), "sensing"),
         (("control", "--gait", "none.json"), "none.json"),
         (("terrain", "hills"), "hills"),
         (("terrain", "rough", "--with", "heigth=1"), "heigth"),
@@ -82,6 +84,12 @@ def test_a_push_too_hard_is_told_and_exits_with_1(cli: Cli) -> None:
         (("robustness", "push", "--largest", "0", "--runs", "1"), "largest"),
         (("robustness", "push", "--speed", "9"), "mean_speed"),
         (("limits", "--only", "spam"), "spam"),
+        (("limits", "--preset", "kamimura2015-rigid"), "spine"),
+        (("limits", "--stiffness", "260", "--speed", "inf"), "speed"),
+        (("limits", "--stiffness", "nan", "--speed", "4.5"), "stiffness"),
+        (("robustness", "push", "--speed", "nan"), "speed"),
+        (("robustness", "step", "--largest", "5000", "--runs", "1"), "too high"),
+        (("robustness", "push", "--gait", "a/gait-1.json", "--gait", "b/gait-1.json"), "gait-1"),
     ],
 )
 def test_bad_input_is_one_clear_line_and_nothing_is_written(
@@ -123,6 +131,10 @@ def test_terrain_from_a_file_and_without_feedback(cli: Cli, tmp_path: Path) -> N
     assert "track.csv" in done.stdout
     assert "nothing: fixed touchdown angles" in done.stdout
     assert cli("terrain", "track.csv", "--strides", "5").returncode == 0
+    done = cli("terrain", "track.csv", "--strides", "5", "--runs", "2")
+    assert_one_clear_line(done, "the same in all 2 runs")
+    # Without feedback none has to exist.
+    assert cli("terrain", "step", "--passive", "--preset", "slip", "--strides", "1").returncode == 0
 
 
 def test_robustness_of_bodies(cli: Cli, tmp_path: Path) -> None:

@@ -144,7 +144,7 @@ BAD = {
     "nothing to steer": ({"inputs": ()}, ParameterError, "missing"),
     "twice the same": ({"inputs": (ANGLES[0], ANGLES[0])}, ParameterError, "twice"),
     "unknown method": ({"method": "lqg"}, UnknownNameError, "lqr"),
-    "no effort": ({"effort": 0.0}, ParameterError, "above zero"),
+    "no effort": ({"effort": 0.0}, ParameterError, "effort = 0"),
     "deadbeat twice": ({"method": "deadbeat", "twice": True}, ParameterError, "once a stride"),
 }
 

@@ -45,10 +45,21 @@ def test_blocks_are_level_between_faces() -> None:
     assert len(set(ground.heights(np.arange(1.25, 10, 0.5)))) == 18
 
 
-places = st.floats(-20, 20)
+# Some of them as far apart as the animal sees.
+places = st.floats(-20, 20) | st.integers(-8, 8).map(lambda k: k / 2)
 profiles = st.lists(st.tuples(places, st.floats(-1, 1)), min_size=1, max_size=12).map(
-    lambda points: tuple(sorted(points))
+    lambda points: _made_a_profile(sorted(points))
 )
+
+
+def _made_a_profile(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """No more than two points at one x, and no slopes that are nearly faces."""
+    kept = points[:1]
+    for x, y in points[1:]:
+        same = [each for each in kept if each[0] == x]
+        if len(same) == 1 or (not same and x - kept[-1][0] > 0.05):
+            kept.append((x, y))
+    return tuple(kept)
 
 
 @given(profiles, st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.1, 0.1), places)
@@ -70,8 +81,9 @@ def test_pieces_are_the_ground(
         if middle > xs[-1]:
             expected += after * (middle - xs[-1]) + wave * math.sin(math.pi * (middle - xs[-1]))
         assert ground.height(middle) == pytest.approx(expected, abs=1e-9)
-    near = ground.heights(np.linspace(x - SIGHT, x + SIGHT, 101))
-    assert near.max() <= ground.top(x) + 1e-12
+    near = [*np.linspace(x - SIGHT, x + SIGHT, 101), *(p for p in xs if abs(p - x) <= SIGHT)]
+    tops = [ground.height(float(p), ahead=ahead) for p in near for ahead in (True, False)]
+    assert max(tops) <= ground.top(x) + 1e-12
 
 
 def test_an_outline_runs_through_every_point() -> None:
@@ -88,7 +100,7 @@ def test_ground_is_read_from_csv(tmp_path: Path) -> None:
     file = tmp_path / "track.csv"
     file.write_text("x,y\n0,0\n2,0.1\n2,0.2\n")
     assert Ground.read(file) == Ground("track.csv", ((0.0, 0.0), (2.0, 0.1), (2.0, 0.2)))
-    file.write_text("0,0\n\n1,0.5\n")
+    file.write_text("\ufeffx,y\n0,0\n\n1,0.5\n", encoding="utf-8")
     assert Ground.read(file).height(0.5) == pytest.approx(0.25)
 
 
@@ -101,6 +113,8 @@ def test_ground_is_read_from_csv(tmp_path: Path) -> None:
         ("1,0\n0,0\n", "goes back"),
         ("", "0 points"),
         ("0,1e9\n", "too high"),
+        ("1,0\n1,0.5\n1,0\n", "two for a face"),
+        ("1,0\n1.0001,0.5\n", "same x"),
     ],
 )
 def test_what_is_no_ground_is_told_in_one_line(tmp_path: Path, text: str, told: str) -> None:
@@ -129,6 +143,9 @@ def test_a_file_that_is_missing_or_no_text_is_told(tmp_path: Path) -> None:
         lambda: Ground.waves(math.inf),
         lambda: Ground.slope(90),
         lambda: Ground.stairs(0.1, count=0),
+        lambda: Ground.stairs(0.1, count=2.7),  # type: ignore[arg-type]
+        lambda: Ground.rough(0.1, spacing=500.0),
+        lambda: Ground.waves(0.1, 1e-3),
         lambda: Ground.stairs(0.1, length=-1),
         lambda: Ground.ramp(0.1, length=0),
         lambda: Ground.step(math.nan),

@@ -22,7 +22,7 @@ from flexspine import (
     stride_map,
     to_dataset,
 )
-from flexspine.errors import ParameterError
+from flexspine.errors import ParameterError, StateError
 from flexspine.models.ground import Ground
 from flexspine.parameters import values
 
@@ -215,6 +215,39 @@ def test_a_body_against_a_wall_stumbles_and_one_on_a_hill_falls(flexible: Model)
         clear = data[f"{point}_y"].values - hill.heights(data[f"{point}_x"].values)
         assert clear.min() > -1e-9, point
     assert end.time == pytest.approx(float(data["time"][-1]))
+
+
+def test_a_peak_between_two_looks_is_not_passed_through(flexible: Model) -> None:
+    saw = Ground("saw", ((0.98, 0.0), (1.0, 0.336), (1.0, 0.0)))
+    assert not simulate(flexible.on(saw), strides=3).outcome.completed
+
+
+def test_toes_at_the_start_look_at_the_ground_before_they_land(flexible: Model) -> None:
+    """What would be a touchdown on ground at zero is in the air above lower ground."""
+    lower = Ground("lower", ((0.0, -0.02),))
+    flat = simulate(flexible)
+    landing = next(e for e in flat.trajectory.events if "touchdown" in e.names[0]).after
+    start = dict(zip(flexible.state_names, landing.states.tolist(), strict=True))
+    run = simulate(flexible.on(lower), duration=0.001, state=start)
+    assert run.phases == ("DF",)
+    high = {**start, "com_y": start["com_y"] + 1e-6}
+    one, other = (simulate(flexible.on(lower), duration=0.05, state=s) for s in (start, high))
+    assert one.phases == other.phases
+    with pytest.raises(StateError, match="on the ground"):
+        simulate(flexible.on(Ground("hill", ((0.0, 0.4),))), duration=0.1, state=start)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e4, 1e5])
+def test_kilometres_away_it_bounds_as_here(flexible: Model, far: float) -> None:
+    here = simulate(flexible)
+    start = dict(zip(flexible.state_names, flexible.apex_state().states.tolist(), strict=True))
+    there = simulate(flexible, strides=1, state={**start, "com_x": far})
+    assert there.outcome.completed
+    assert there.phases == here.phases
+    shift = np.zeros(len(start))
+    shift[0] = far
+    moved = there.trajectory.end.states - shift
+    assert moved == pytest.approx(here.trajectory.end.states, abs=1e-9 * far / 1e3)
 
 
 def test_legs_on_the_ground_at_the_start_stand_on_it(flexible: Model) -> None:

@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import binomtest
 
 from flexspine import examine, load_model
-from flexspine.control.disturbance import DISTURBANCES, Fate, draw, endure
+from flexspine.control.disturbance import DISTURBANCES, Draw, Fate, draw, endure
 from flexspine.control.stabilize import ANGLES, Stabilizer, stabilize
 from flexspine.control.steering import Fixed
 from flexspine.errors import InputError, OutputError, ParameterError, UnknownNameError
@@ -31,15 +31,16 @@ def steered() -> Stabilizer:
 
 def test_a_push_changes_the_speed_by_impulse_over_mass() -> None:
     gait = steered().gait
-    pushed = DISTURBANCES["push"].make(gait.model, 5.2, 0.3, 0, 1.0).model
+    pushed = DISTURBANCES["push"].make(gait, Draw(5.2, 0.3, 0), 5).model
     assert pushed.apex["speed"] - gait.model.apex["speed"] == pytest.approx(5.2 / 20.8)
     assert {**pushed.apex, "speed": 0} == {**gait.model.apex, "speed": 0}
 
 
 def test_steps_stand_where_they_are_drawn() -> None:
-    upset = DISTURBANCES["step"].make(steered().gait.model, -0.02, 0.25, 0, 1.2)
+    upset = DISTURBANCES["step"].make(steered().gait, Draw(-0.02, 0.25, 0), 5)
     assert upset.model.ground is not None
-    assert upset.model.ground.heights([1.299, 1.301]).tolist() == [0.0, -0.02]
+    face = 1 + 0.25 * steered().gait.stride_length
+    assert upset.model.ground.heights([face - 1e-3, face + 1e-3]).tolist() == [0.0, -0.02]
 
 
 @pytest.mark.parametrize("kind", DISTURBANCES)
@@ -47,8 +48,8 @@ def test_small_disturbances_are_survived_and_huge_ones_are_not(kind: str) -> Non
     what = DISTURBANCES[kind]
     for sign in (1, -1) if what.signed else (1,):
         small, huge = sign * what.largest / 1000, sign * 10 * what.largest
-        assert endure(steered(), what, small, 0.6, 1, 20).survived
-        fate = endure(steered(), what, huge, 0.6, 1, 20)
+        assert endure(steered(), what, Draw(small, 0.6, 1), 20).survived
+        fate = endure(steered(), what, Draw(huge, 0.6, 1), 20)
         assert not fate.survived
         assert fate.strides < 20
 
@@ -117,10 +118,13 @@ def test_runs_repeat_whoever_does_them_and_go_on_where_they_were(tmp_path: Path)
     assert again.animals["thrust"].fates == one.animals["thrust"].fates
     assert np.array_equal(one.animals["thrust"].sizes, one.animals["angles"].sizes)
     k = 77
-    expected = endure(steered(), DISTURBANCES["push"], *draw(DISTURBANCES["push"], 8.0, 3, k), 6)
+    expected = endure(steered(), DISTURBANCES["push"], draw(DISTURBANCES["push"], 8.0, 3, k), 6)
     assert one.animals["thrust"].fates[k] == expected
     with pytest.raises(OutputError, match="other settings"):
         survive(animals, "push", store=store, **{**asked, "seed": 4})  # type: ignore[arg-type]
+    turned = dict(reversed(animals.items()))
+    with pytest.raises(OutputError, match="other settings"):
+        survive(turned, "push", store=store, **asked)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -131,6 +135,9 @@ def test_runs_repeat_whoever_does_them_and_go_on_where_they_were(tmp_path: Path)
         ("push", {"largest": float("nan")}),
         ("push", {"seed": -1}),
         ("push", {"runs": 0}),
+        ("push", {"runs": 10**11}),
+        ("step", {"largest": 5000.0}),
+        ("sensing", {"largest": 1e308}),
         ("push", {"strides": 0}),
         ("push", {"processes": 0}),
     ],
@@ -151,8 +158,8 @@ def test_feedback_goes_to_another_process_whole() -> None:
 def test_limits_are_found_from_the_safe_side(
     monkeypatch: pytest.MonkeyPatch, threshold: float
 ) -> None:
-    def fake(_s: object, _kind: object, size: float, _w: float, seed: int, strides: int) -> Fate:
-        fine = size <= threshold * (1 + seed)
+    def fake(_stabilizer: object, _kind: object, drawn: Draw, strides: int) -> Fate:
+        fine = drawn.size <= threshold * (1 + drawn.seed)
         return Fate(strides if fine else 0, 0.0, "completed" if fine else "fell")
 
     monkeypatch.setattr(limits_module, "endure", fake)
@@ -188,8 +195,8 @@ def test_limits_over_stiffness_and_speed(tmp_path: Path) -> None:
     ]  # fmt: skip
     found = cells[0].limits["push_forward"]
     push = DISTURBANCES["push"]
-    assert endure(steered(), push, 0.999 * found, 0.0, 0, 10).survived
-    assert not endure(steered(), push, 1.001 * (1 + PRECISION) * found, 0.0, 0, 10).survived
+    assert endure(steered(), push, Draw(0.999 * found, 0.0, 0), 10).survived
+    assert not endure(steered(), push, Draw(1.001 * (1 + PRECISION) * found, 0.0, 0), 10).survived
     assert cells[0].radius == pytest.approx(1.3278, abs=1e-4)
     assert cells[0].steered_radius is not None
     assert cells[0].steered_radius < 1
@@ -217,6 +224,11 @@ def test_distances_to_the_first_fall() -> None:
     assert found.quantile(0.25) == 1.0
     assert found.quantile(0.5) == 3.0
     assert found.quantile(0.51) is None
+    # Of two that are left after 9 m one ends at 9.5 m: half of the half that is left.
+    late = Wayfaring(found.terrain, 9, 0, (*fates, Fate(9, 9.5, "fell")))
+    distances, going = late.going()
+    assert distances.tolist() == [1.0, 3.0, 9.0, 9.5]
+    assert going == pytest.approx([0.75, 0.5, 0.5, 0.0])
     assert found.metres_per_fall() == (3 + 9 + 1 + 9.5) / 2
     assert Wayfaring(found.terrain, 9, 0, fates[1:2]).metres_per_fall() is None
 
@@ -262,6 +274,22 @@ def test_many_runs_are_single_runs_and_seeds_decide() -> None:
 def test_what_is_no_terrain_is_refused(terrain: Terrain, error: type[Exception]) -> None:
     with pytest.raises(error):
         terrain.ground(0, 1.0, 10)
+
+
+def test_a_file_is_run_over_once(tmp_path: Path) -> None:
+    (tmp_path / "track.csv").write_text("1,0\n1,-0.01\n")
+    gait, track = steered().gait, Terrain(str(tmp_path / "track.csv"), {})
+    asked = {"stride": gait.stride_length, "strides": 3}
+    one = distance_to_fall(gait.model, steered(), track, runs=1, **asked)  # type: ignore[arg-type]
+    assert one.arrived == 1
+    with pytest.raises(ParameterError, match="the same in all 2 runs"):
+        distance_to_fall(gait.model, steered(), track, runs=2, **asked)  # type: ignore[arg-type]
+
+
+def test_where_the_ground_begins_and_how_high_it_is_have_nothing_to_do_with_each_other() -> None:
+    drawn = [Terrain("rough", {}).ground(seed, 1.2, 5).points for seed in range(200)]
+    begins, heights = ([points[k][k] for points in drawn] for k in (0, 1))
+    assert abs(np.corrcoef(begins, heights)[0, 1]) < 0.2
 
 
 def everywhere(make: Callable[[int], float]) -> set[float]:

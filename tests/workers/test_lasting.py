@@ -57,7 +57,7 @@ def test_results_come_in_order_and_progress_counts_pieces() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{}\n", "no json\n", '{"pieces": 2, "seed": 1}\n', "\xff\n", "[1]\n{}\n"]
+    "text", ["{}\n", "no json\n", '{"pieces": 2, "seed": 1}\n', "\xff\n", "[1]\n{}\n"]
 )
 def test_a_file_of_something_else_is_refused_and_kept(tmp_path: Path, text: str) -> None:
     store = tmp_path / "kept.jsonl"
@@ -65,6 +65,14 @@ def test_a_file_of_something_else_is_refused_and_kept(tmp_path: Path, text: str)
     with pytest.raises(OutputError, match="damaged, or holds"):
         carried_out([1, 2], store, seed=1)
     assert store.read_text(encoding="latin-1") == text
+    assert done == []
+
+
+def test_a_file_that_was_made_and_not_written_is_begun_anew(tmp_path: Path) -> None:
+    store = tmp_path / "kept.jsonl"
+    store.touch()
+    assert carried_out([2], store) == [4]
+    assert carried_out([2], store) == [4]
     assert done == []
 
 

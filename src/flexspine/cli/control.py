@@ -24,6 +24,9 @@ from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabiliz
 # Strides from the start that are recorded with --out.
 SHOWN = 8
 
+# Spectral radii that differ by less are the same.
+ON_LEVEL = 1e-6
+
 
 def control(
     preset: Preset = None,
@@ -86,12 +89,12 @@ def control(
             model = model.with_values(apex={"speed": speed}, origin=f"a push of {push:g} N s")
         progress.begin(f"running {strides} strides")
         run = run_steered(model, found, strides=strides, noise=noise, seed=seed)
-        record = {**steered_record(run, found), "push": push}
+        record = {**steered_record(run, start, found), "push": push}
         if directory is not None:
             from flexspine.report.control_figure import plot_control
             from flexspine.studies.tables import write_table
 
-            table = apex_table(run, found)
+            table = apex_table(run, start)
             first = run_steered(
                 model, found, strides=min(strides, SHOWN), noise=noise, seed=seed, record=True
             )
@@ -109,22 +112,30 @@ def control(
 
 def report(record: dict[str, Any]) -> str:
     """The run in a few lines for a person."""
-    radius = record["spectral_radius"]
-    often = "twice" if record["acts_per_stride"] == 2 else "once"
-    level = radius["on_level"]
-    with_it = f"{radius['with']:.4f}"
-    if level < radius["with"] - 1e-6:
-        with_it = f"{level:.4f} on the energy level, which is kept"
-    lines = [
-        f"{record['preset']}: {record['outcome']} ({record['message']})",
-        f"  steered          {', '.join(record['inputs'])}; {record['method']}, {often} a stride",
-        f"  spectral radius  {radius['without']:.4f} without feedback, {with_it} with it",
+    lines = [f"{record['preset']}: {record['outcome']} ({record['message']})"]
+    if record["ground"]:
+        lines.append(f"  ground           {record['ground']}")
+    lines += [
+        *_feedback(record),
         f"  strides          {record['strides']} over {record['distance']:.1f} m",
         f"  deviation        {record['largest_deviation']:.3g} at most, "
         f"{record['last_deviation']:.3g} at the end (natural units)",
     ]
-    if record["ground"]:
-        lines.insert(1, f"  ground           {record['ground']}")
     if record["outcome"] != "completed":
         lines.append(f"  advice           {record['advice']}")
     return "\n".join(lines)
+
+
+def _feedback(record: dict[str, Any]) -> list[str]:
+    radius = record["spectral_radius"]
+    if "with" not in radius:
+        without = f"  spectral radius  {radius['without']:.4f}"
+        return ["  steered          nothing: fixed touchdown angles", without]
+    often = "twice" if record["acts_per_stride"] == 2 else "once"
+    level, with_it = radius["on_level"], f"{radius['with']:.4f}"
+    if level < radius["with"] - ON_LEVEL:
+        with_it = f"{level:.4f} on the energy level, which is kept"
+    return [
+        f"  steered          {', '.join(record['inputs'])}; {record['method']}, {often} a stride",
+        f"  spectral radius  {radius['without']:.4f} without feedback, {with_it} with it",
+    ]

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.interrupts import interruptible
+from flexspine.cli.kept import kept
 from flexspine.cli.options import Assignments, GaitFile, Json, Preset
 from flexspine.cli.output import counting, print_json, steps
 from flexspine.cli.starts import starting_gait
-from flexspine.cli.sweep import Processes, count_of, unfinished_is_kept
+from flexspine.cli.sweep import Processes, count_of
 from flexspine.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from flexspine.studies.limits import Cell
-
-UNFINISHED = "limits.unfinished.jsonl"
 
 STIFFNESSES = (200.0, 220.0, 240.0, 260.0)
 SPEEDS = (3.0, 3.5, 4.0, 4.25, 4.5)
@@ -67,16 +67,14 @@ def limits(
     from flexspine.cli.results import ResultDirectory, write_json
     from flexspine.studies.limits import LIMITS, find_limits
 
+    interruptible()
     names = [limit.name for limit in LIMITS]
     for name in only or []:
         if name not in names:
             raise UnknownNameError("limit", name, names)
     with ExitStack() as stack:
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
-        store = None
-        if out is not None:
-            stack.enter_context(unfinished_is_kept(out))
-            store = out / UNFINISHED
+        store = stack.enter_context(kept(out, "limits"))
         with steps() as progress:
             start = starting_gait(gait, preset, set_, None, progress)
         with counting("gaits and designs") as count:
@@ -98,11 +96,10 @@ def limits(
             "cells": [vars(cell) for cell in cells],
         }
         some = any(cell.limits for cell in cells)
-        if directory is not None and store is not None:
+        if directory is not None:
             with directory.stage() as stage:
                 write_json(record, stage / "limits.json")
                 _write(stage, cells, some)
-            store.unlink()
     if json:
         print_json(record)
     else:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli.interrupts import interruptible
+from flexspine.cli.kept import kept
 from flexspine.cli.options import Json
 from flexspine.cli.output import counting, print_json, steps
 from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
-from flexspine.cli.sweep import Processes, count_of, unfinished_is_kept
+from flexspine.cli.sweep import Processes, count_of
 from flexspine.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from flexspine.control.stabilize import Stabilizer
     from flexspine.studies.robustness import Endurance, Robustness
-
-UNFINISHED = "{}.unfinished.jsonl"
 
 
 def robustness(
@@ -69,8 +70,8 @@ def robustness(
     Gaits have the energy and apex height of the published ones; feedback is designed for each by
     the same rule, and each meets the same disturbances: a push forward or backward at an apex
     (N s), a step up or down anywhere in a stride, rough ground, or noise. Interrupted, the same
-    command goes on. Units are SI. Exit code 0: done; 1: a body has no gait there, or none that can
-    be stabilised; 2: bad input; 3: the machine failed; 130: interrupted.
+    command goes on. Units are SI. Exit code 0: done; 1: no feedback makes a gait stable; 2: bad
+    input, or a speed without a gait; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine robustness step --out results/step
@@ -79,17 +80,17 @@ def robustness(
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.control.disturbance import disturbance
+    from flexspine.models.model import check_between
     from flexspine.studies.robustness import survive
 
     if body and gait:
         raise InputError("--body and --gait are both given", "leave one of them")
+    interruptible()
     disturbance(kind)  # refused before anything is done
+    check_between("--speed", speed, 0, inf)
     with ExitStack() as stack:
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
-        store = None
-        if out is not None:
-            stack.enter_context(unfinished_is_kept(out))
-            store = out / UNFINISHED.format(kind)
+        store = stack.enter_context(kept(out, kind))
         with steps() as progress:
             progress.begin("looking for gaits")
             animals = {
@@ -102,10 +103,9 @@ def robustness(
                 processes=count_of(processes), store=store, progress=count,
             )  # fmt: skip
         record = _record(found, animals)
-        if directory is not None and store is not None:
+        if directory is not None:
             with directory.stage() as stage:
                 _write(stage, found, record)
-            store.unlink()
     if json:
         print_json(record)
     else:
@@ -122,6 +122,10 @@ def _gaits(bodies: list[str] | None, files: list[Path] | None, speed: float) -> 
     if files:
         found = {}
         for file in files:
+            if file.stem in found:
+                raise InputError(
+                    f"two gaits are called '{file.stem}'", "rename the file of one of them"
+                )
             found[file.stem] = load_gait(file)
             if found[file.stem].flaw is not None:
                 raise InputError(f"'{file}' holds no gait: {found[file.stem].flaw}", "give others")
@@ -202,6 +206,8 @@ def _report(record: dict[str, Any]) -> str:
 
 def _limits(side: dict[str, Any], unit: str) -> str:
     ended = ", ".join(f"{count} {name}" for name, count in side["outcomes"].items())
+    if not ended:
+        return "no runs"
     if side["all_survived_up_to"] is None:
         return f"all survived ({ended})"
     return (

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from flexspine.cli.control import report
 from flexspine.cli.interrupts import interruptible
+from flexspine.cli.kept import kept
 from flexspine.cli.options import (
     Animation,
     Assignments,
@@ -23,16 +25,15 @@ from flexspine.cli.options import (
 from flexspine.cli.output import counting, print_json, steps
 from flexspine.cli.starts import starting_gait
 from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
-from flexspine.cli.sweep import Processes, count_of, unfinished_is_kept
+from flexspine.cli.sweep import Processes, count_of
 from flexspine.errors import InputError
 
 if TYPE_CHECKING:
-    from flexspine.control.steering import SteeredRun
+    from flexspine.control.steering import SteeredRun, Steering
+    from flexspine.gaits.gait import Gait
     from flexspine.studies.wayfaring import Wayfaring
 
-UNFINISHED = "terrain.unfinished.jsonl"
-
-# More strides than this are not recorded: gigabytes, and nobody looks at them.
+# No more strides than this are recorded with --out: gigabytes, and nobody looks at them.
 RECORDED = 200
 
 
@@ -94,7 +95,6 @@ def terrain(
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.control.steered_record import steered_record
-    from flexspine.control.steering import Fixed, Steering
     from flexspine.studies.wayfaring import Terrain, distance_to_fall, walk_over
 
     interruptible()
@@ -107,27 +107,28 @@ def terrain(
         progress = stack.enter_context(steps())
         start = starting_gait(gait, preset, set_, None, progress)
         where.ground(seed, start.stride_length, strides)  # refused before anything is done
-        progress.begin("designing the feedback")
-        found = stabilizer_of(start, steer, method, once, effort)
-        steering: Steering = Fixed(found.inputs, found.usual) if passive else found
+        found, steering = None, _passive(start)
+        if not passive:
+            progress.begin("designing the feedback")
+            found = steering = stabilizer_of(start, steer, method, once, effort)
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         progress.begin("running")
-        run = walk_over(
-            start.model, steering, where, stride=start.stride_length, strides=strides, seed=seed,
-            record=directory is not None and strides <= RECORDED,
-        )  # fmt: skip
-        record = {**steered_record(run, found), "passive": passive}
+        over = partial(walk_over, start.model, steering, where, stride=start.stride_length)
+        run = over(strides=strides, seed=seed)
+        record = {**steered_record(run, start, found), "passive": passive}
         if runs > 1:
-            many = stack.enter_context(_kept(out))
+            store = stack.enter_context(kept(out, "terrain"))
             with counting("runs") as count:
                 ensemble = distance_to_fall(
                     start.model, steering, where, stride=start.stride_length, strides=strides,
-                    runs=runs, seed=seed, processes=count_of(processes), store=many,
+                    runs=runs, seed=seed, processes=count_of(processes), store=store,
                     progress=count,
                 )  # fmt: skip
             record["ensemble"] = _ensemble_record(ensemble)
         if directory is not None:
-            with directory.stage_run(run, record, animation, progress) as stage:
+            record["recorded_strides"] = min(strides, RECORDED)
+            first = over(strides=record["recorded_strides"], seed=seed, record=True)
+            with directory.stage_run(first, record, animation, progress) as stage:
                 _write_ground(run, stage)
                 if runs > 1:
                     _write_ensemble(ensemble, record, stage)
@@ -140,15 +141,11 @@ def terrain(
     return 0 if runs > 1 or run.outcome.completed else 1
 
 
-@contextmanager
-def _kept(out: Path | None) -> Iterator[Path | None]:
-    """A file for what is done of many runs, which goes when all is."""
-    if out is None:
-        yield None
-        return
-    with unfinished_is_kept(out):
-        yield out / UNFINISHED
-    (out / UNFINISHED).unlink(missing_ok=True)
+def _passive(gait: Gait) -> Steering:
+    from flexspine.control.steering import Fixed
+    from flexspine.gaits.problem import ANGLES
+
+    return Fixed(ANGLES, np.array([gait.model.numbers[name] for name in ANGLES]))
 
 
 def _ensemble_record(found: Wayfaring) -> dict[str, Any]:
@@ -190,10 +187,6 @@ def _write_ensemble(found: Wayfaring, record: dict[str, Any], stage: Path) -> No
 def _report(record: dict[str, Any]) -> str:
     """The run, and many more, in a few lines for a person."""
     lines = [report(record)]
-    if record["passive"]:
-        lines = [line for line in report(record).splitlines() if "steered" not in line]
-        lines = [line for line in lines if "spectral radius" not in line]
-        lines.insert(1, "  steered          nothing: fixed touchdown angles")
     many = record.get("ensemble")
     if many:
         ended = ", ".join(f"{count} {name}" for name, count in many["outcomes"].items())

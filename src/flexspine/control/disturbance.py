@@ -11,9 +11,18 @@ import numpy as np
 from flexspine.control.stabilize import Stabilizer
 from flexspine.control.steering import Noise, SteeredRun, steer
 from flexspine.errors import UnknownNameError
+from flexspine.gaits.gait import Gait
 from flexspine.hybrid.outcome import COMPLETED
 from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model
+
+
+class Draw(NamedTuple):
+    """How large a disturbance is, where in a stride it begins (0 to 1), and a seed."""
+
+    size: float
+    where: float
+    seed: int
 
 
 class Upset(NamedTuple):
@@ -23,8 +32,8 @@ class Upset(NamedTuple):
     noise: Noise = Noise()
 
 
-# From a gait's model, size, where (0 to 1 of a stride), seed and length of a stride (m).
-Maker = Callable[[Model, float, float, int, float], Upset]
+# What becomes of a gait that is to make so many strides.
+Maker = Callable[[Gait, Draw, int], Upset]
 
 
 @dataclass(frozen=True)
@@ -39,39 +48,41 @@ class Disturbance:
     make: Maker
 
 
-def _push(model: Model, size: float, _where: float, _seed: int, _stride: float) -> Upset:
-    return Upset(model.with_values(apex={"speed": model.apex["speed"] + size / model.mass}))
+def _push(gait: Gait, drawn: Draw, _strides: int) -> Upset:
+    speed = gait.model.apex["speed"] + drawn.size / gait.model.mass
+    return Upset(gait.model.with_values(apex={"speed": speed}))
 
 
-def _step(model: Model, size: float, where: float, _seed: int, stride: float) -> Upset:
-    return Upset(model.on(Ground.step(size, at=BEGINS + where * stride)))
+def _step(gait: Gait, drawn: Draw, _strides: int) -> Upset:
+    return Upset(gait.model.on(Ground.step(drawn.size, at=_place(gait, drawn))))
 
 
-def _rough(model: Model, size: float, where: float, seed: int, stride: float) -> Upset:
-    return Upset(model.on(_far(Ground.rough, size, where, seed, stride)))
+def _rough(gait: Gait, drawn: Draw, strides: int) -> Upset:
+    at = _place(gait, drawn)
+    length = LONGER * gait.stride_length * strides + SPACING
+    return Upset(gait.model.on(Ground.rough(drawn.size, SPACING, length, drawn.seed, at)))
 
 
-def _blocks(model: Model, size: float, where: float, seed: int, stride: float) -> Upset:
-    return Upset(model.on(_far(Ground.blocks, size, where, seed, stride)))
+def _blocks(gait: Gait, drawn: Draw, strides: int) -> Upset:
+    at = _place(gait, drawn)
+    length = LONGER * gait.stride_length * strides + SPACING
+    return Upset(gait.model.on(Ground.blocks(drawn.size, SPACING, length, drawn.seed, at)))
 
 
-def _far(
-    make: Callable[..., Ground], size: float, where: float, seed: int, stride: float
-) -> Ground:
-    at = BEGINS + where * stride
-    return make(size, SPACING, LENGTH, seed, at)
+def _place(gait: Gait, drawn: Draw) -> float:
+    return BEGINS + drawn.where * gait.stride_length
 
 
-def _acting(model: Model, size: float, _where: float, _seed: int, _stride: float) -> Upset:
-    return Upset(model, Noise(acting=size))
+def _acting(gait: Gait, drawn: Draw, _strides: int) -> Upset:
+    return Upset(gait.model, Noise(acting=drawn.size))
 
 
-def _sensing(model: Model, size: float, _where: float, _seed: int, _stride: float) -> Upset:
-    return Upset(model, Noise(sensing=size))
+def _sensing(gait: Gait, drawn: Draw, _strides: int) -> Upset:
+    return Upset(gait.model, Noise(sensing=drawn.size))
 
 
-# m; of rough ground, as long as any run of a few hundred strides.
-SPACING, LENGTH = 0.3, 1000.0
+# m; of rough ground. It is so much longer than the undisturbed way, for those that get faster.
+SPACING, LONGER = 0.3, 1.5
 
 DISTURBANCES: Mapping[str, Disturbance] = {
     kind.name: kind
@@ -112,17 +123,15 @@ class Fate(NamedTuple):
         return self.outcome == COMPLETED.name
 
 
-def endure(
-    stabilizer: Stabilizer, kind: Disturbance, size: float, where: float, seed: int, strides: int
-) -> Fate:
+def endure(stabilizer: Stabilizer, kind: Disturbance, drawn: Draw, strides: int) -> Fate:
     """Run a gait under feedback and a disturbance for so many strides, or until it fails."""
-    gait = stabilizer.gait
-    upset = kind.make(gait.model, size, where, seed, gait.stride_length)
-    return Fate.of(steer(upset.model, stabilizer, strides=strides, noise=upset.noise, seed=seed))
+    upset = kind.make(stabilizer.gait, drawn, strides)
+    run = steer(upset.model, stabilizer, strides=strides, noise=upset.noise, seed=drawn.seed)
+    return Fate.of(run)
 
 
-def draw(kind: Disturbance, largest: float, seed: int, number: int) -> tuple[float, float, int]:
-    """Size, place and seed of one of many runs; the same for every animal."""
+def draw(kind: Disturbance, largest: float, seed: int, number: int) -> Draw:
+    """Draw one of many disturbances; the same for every animal."""
     random = np.random.default_rng([seed, number])
     size = float(random.uniform(-largest if kind.signed else 0.0, largest))
-    return size, float(random.uniform()), int(random.integers(2**31))
+    return Draw(size, float(random.uniform()), int(random.integers(2**31)))

@@ -25,12 +25,13 @@ from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.system import Section
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import STOOD
-from flexspine.models.model import Model
+from flexspine.models.model import Model, check_between
 
 METHODS = ("lqr", "deadbeat")
 
 # Of what a deviation costs, in natural units; what steering costs for as much of it.
 EFFORT = 0.1
+EFFORTS = 1e-9, 1e9
 
 # Riccati equations are iterated until gains change by less; they converge geometrically.
 SETTLED, MOST_ROUNDS = 1e-13, 10_000
@@ -141,8 +142,9 @@ def stabilize(
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
-    if not effort > 0:
-        raise ParameterError(f"effort = {effort:g} is not usable", "give a number above zero")
+    if isinstance(inputs, str):
+        raise ParameterError(f"inputs = '{inputs}' is one name", "give a tuple of names")
+    check_between("effort", effort, *EFFORTS)
     if gait.strides != 1:
         raise ParameterError(
             f"the gait repeats after {gait.strides} strides only", "give one of a single stride"
@@ -243,7 +245,7 @@ def _lqr(parts: tuple[Part, ...], effort: float) -> tuple[Array, ...]:
             (a, b), cost = maps[i], costs[(i + 1) % len(parts)]
             weight = effort * np.eye(b.shape[1]) + b.T @ cost @ b
             gain = np.asarray(np.linalg.solve(weight, b.T @ cost @ a), dtype=float)
-            change = max(change, float(np.abs(gain - gains[i]).max()))
+            change = max(change, float(np.nan_to_num(np.abs(gain - gains[i]), nan=np.inf).max()))
             gains[i] = gain
             costs[i] = np.eye(len(parts[i].level)) + a.T @ cost @ (a - b @ gain)
         if not np.isfinite(change):

@@ -10,6 +10,7 @@ import numpy as np
 from flexspine._version import SCHEMA_VERSION
 from flexspine.control.stabilize import Stabilizer
 from flexspine.control.steering import SteeredRun
+from flexspine.gaits.gait import Gait
 from flexspine.gaits.record import finite
 from flexspine.gaits.stability import floquet_multipliers
 from flexspine.parameters import values
@@ -21,40 +22,53 @@ def stabilizer_record(stabilizer: Stabilizer) -> dict[str, Any]:
     The spectral radius ``on_level`` is that with feedback, but for the multiplier 1 of an energy
     that nothing changes.
     """
-    gait = stabilizer.gait
-    free = floquet_multipliers(gait)
+    record = _gait_record(stabilizer.gait)
     return {
-        "preset": gait.model.name,
-        "model": gait.model.kind.name,
-        "parameters": values(gait.model.parameters),
-        "apex": dict(gait.model.apex),
-        "touchdown_angles": dict(gait.model.touchdown),
-        "mean_speed": gait.mean_speed,
-        "energy": gait.energy,
+        **record,
         "inputs": list(stabilizer.inputs),
+        "usual": stabilizer.usual.tolist(),
         "method": stabilizer.method,
         "acts_per_stride": len(stabilizer.parts),
         "gains": [gain.tolist() for gain in stabilizer.gains],
         "floquet_multipliers": {
-            "without": [[value.real, value.imag] for value in free.multipliers],
+            **record["floquet_multipliers"],
             "with": [[value.real, value.imag] for value in stabilizer.multipliers.tolist()],
         },
         "spectral_radius": {
-            "without": free.spectral_radius,
+            **record["spectral_radius"],
             "with": float(np.abs(stabilizer.multipliers[0])),
             "on_level": stabilizer.level_spectral_radius,
         },
     }
 
 
-def steered_record(run: SteeredRun, stabilizer: Stabilizer) -> dict[str, Any]:
-    """How a run under feedback went; SI and radians, deviations in natural units."""
+def _gait_record(gait: Gait) -> dict[str, Any]:
+    model, free = gait.model, floquet_multipliers(gait)
+    return {
+        "preset": model.name,
+        "model": model.kind.name,
+        "parameters": values(model.parameters),
+        "apex": dict(model.apex),
+        "touchdown_angles": dict(model.touchdown),
+        "mean_speed": gait.mean_speed,
+        "energy": gait.energy,
+        "floquet_multipliers": {
+            "without": [[value.real, value.imag] for value in free.multipliers]
+        },
+        "spectral_radius": {"without": free.spectral_radius},
+    }
+
+
+def steered_record(
+    run: SteeredRun, gait: Gait, stabilizer: Stabilizer | None = None
+) -> dict[str, Any]:
+    """How a run of a gait under feedback, or without, went; deviations in natural units."""
     start, end = run.trajectory.start, run.trajectory.end
     distance = float(end.states[0] - start.states[0])
-    rows = apex_table(run, stabilizer)
+    rows = apex_table(run, gait)
     record = {
         "schema_version": SCHEMA_VERSION,
-        **stabilizer_record(stabilizer),
+        **(_gait_record(gait) if stabilizer is None else stabilizer_record(stabilizer)),
         "noise": asdict(run.noise),
         "seed": run.seed,
         "ground": run.model.ground.name if run.model.ground else None,
@@ -71,13 +85,13 @@ def steered_record(run: SteeredRun, stabilizer: Stabilizer) -> dict[str, Any]:
     return {key: finite(value) for key, value in record.items()}
 
 
-def apex_table(run: SteeredRun, stabilizer: Stabilizer) -> list[dict[str, float]]:
+def apex_table(run: SteeredRun, gait: Gait) -> list[dict[str, float]]:
     """One row per apex: when and where, its coordinates, how far off they are, what was steered.
 
     The height is that above the ground. ``deviation`` is the length of the vector of deviations
     from the gait, in natural units.
     """
-    model, gait = run.model, stabilizer.gait.model
+    model, undisturbed = run.model, gait.model
     rows = []
     for number, (point, apex, inputs) in enumerate(
         zip(run.section_points, run.apexes, run.inputs, strict=True)
@@ -85,7 +99,7 @@ def apex_table(run: SteeredRun, stabilizer: Stabilizer) -> list[dict[str, float]
         x = float(point.states[0])
         if model.ground is not None:
             apex = {**apex, "height": apex["height"] - model.ground.height(x)}
-        off = [(apex[name] - gait.apex[name]) / gait.scales[name] for name in apex]
+        off = [(apex[n] - undisturbed.apex[n]) / undisturbed.scales[n] for n in apex]
         rows.append(
             {
                 "stride": number,

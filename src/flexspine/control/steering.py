@@ -25,9 +25,13 @@ from flexspine.models.bounder import STOOD
 from flexspine.models.model import TOLERANCES, Model, check_between
 from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count
 from flexspine.models.underfoot import TOES, OnGround, lose
+from flexspine.parameters import check_seed, is_number, shortened
+
+# Natural units; nothing survives a hundredth of it.
+LOUDEST = 10.0
 
 # What no touchdown angle is steered beyond, in rad from the vertical.
-STEEPEST = 1.4
+STEEPEST_LEG = 1.4
 
 # How far anything else is steered away from what it was, in natural units: a quarter of a leg.
 FARTHEST = 0.25
@@ -44,6 +48,14 @@ class Noise:
     sensing: float = 0.0
     acting: float = 0.0
     uniform: bool = False
+
+    def __post_init__(self) -> None:
+        for name, size in (("sensing", self.sensing), ("acting", self.acting)):
+            if not (is_number(size) and 0 <= size <= LOUDEST):
+                raise ParameterError(
+                    f"{name} noise = {shortened(size)} is not usable",
+                    f"give a number from 0 to {LOUDEST:g}",
+                )
 
 
 class Steering(ABC):
@@ -134,8 +146,8 @@ class SteeredBounder(OnGround):
         angles = np.array([name.startswith("touchdown.") for name in steering.inputs])
         usual = np.array([model.numbers[name] for name in steering.inputs])
         reach = FARTHEST * np.array([model.unit_of(name) for name in steering.inputs])
-        self._least = np.where(angles, -STEEPEST, usual - reach)
-        self._most = np.where(angles, STEEPEST, usual + reach)
+        self._least = np.where(angles, -STEEPEST_LEG, usual - reach)
+        self._most = np.where(angles, STEEPEST_LEG, usual + reach)
         self._stood = [system.places[flag] for flag in STOOD]
         self._scales = np.array([model.scales[name] for name in system.section.coordinates])
 
@@ -203,6 +215,19 @@ class SteeredRun(Run):
     seed: int = field(kw_only=True)
 
     @property
+    def remarks(self) -> dict[str, str]:
+        """What was steered, unless it never changed, and with which noise."""
+        told = (
+            {} if isinstance(self.steering, Fixed) else {"steered": ", ".join(self.steering.inputs)}
+        )
+        if self.noise.acting:
+            kind = "uniform up to" if self.noise.uniform else "Gaussian of"
+            told["noise on what is steered"] = f"{kind} {100 * self.noise.acting:g} %"
+        if self.noise.sensing:
+            told["noise on the apex"] = f"{self.noise.sensing:g}"
+        return told
+
+    @property
     def inputs(self) -> list[dict[str, float]]:
         """What was steered, from each apex of `apexes` on, by name."""
         bound = self.trajectory.bound
@@ -227,8 +252,7 @@ def steer(
     `UnknownNameError`.
     """
     wanted = check_count("strides", strides)
-    if not (isinstance(seed, int) and seed >= 0):
-        raise ParameterError(f"seed = {seed} is not usable", "give a whole number from 0 on")
+    seed = check_seed(seed)
     noise = noise or Noise()
     tolerance = check_between("tolerance", tolerance, *TOLERANCES)
     bound = SteeredBounder(model, steering, tolerance, noise, seed)

@@ -32,6 +32,10 @@ CLOSE = 1e-6
 # Guard units; a guard this close to zero is zero with rounding error.
 ZERO = 1e-12
 
+# Units in the last place of the largest state, such as a position kilometres away: what guards are
+# off by that are differences of such.
+ROUNDING = 64 * np.finfo(float).eps
+
 # Guard units per second; crossed more slowly, one rounding error of the guard (1e-16) moves the
 # event by more than SIMULTANEITY.
 GRAZING_RATE = 1e-4
@@ -236,7 +240,7 @@ class _Run:
         self._decide_more()
         return True
 
-    def _decide(self, guard: Guard, decide: Decision) -> bool:
+    def _decide(self, guard: Guard, decide: Decision, *, starting: bool = False) -> bool:
         """Let a guard fire whose jump is computed in numbers; returns whether anything happened."""
         found = decide(self.bound, self._here())
         if found is None:
@@ -252,17 +256,21 @@ class _Run:
         _, self.mode, self.states, self.held = found
         if not guard.quiet:
             self._note((guard.name,), before)
-        mode = self.bound.mode(self.mode)
-        self._settle(mode, mode.evaluate(self.states, self.held))
-        self._decide_more()
+        if not starting:
+            mode = self.bound.mode(self.mode)
+            self._settle(mode, mode.evaluate(self.states, self.held))
+            self._decide_more()
         return True
 
-    def _decide_more(self, *, by_level_only: bool = False) -> None:
-        """Let decided guards fire that are due at this instant too."""
+    def _decide_more(self, *, starting: bool = False) -> None:
+        """Let decided guards fire that are due at this instant too.
+
+        When ``starting``, only those that are armed by level, and nothing else yet.
+        """
         while self.outcome is None:
             mode = self.bound.mode(self.mode)
             here = mode.code.decided_here
-            if by_level_only:
+            if starting:
                 here = tuple(due for due in here if due.by_level)
             if not here:
                 return
@@ -272,7 +280,7 @@ class _Run:
                 return
             guard = mode.code.by_name[due].guard
             assert guard.decide is not None
-            if not self._decide(guard, guard.decide):
+            if not self._decide(guard, guard.decide, starting=starting):
                 self.fired.append(due)
 
     def _may_cross(self) -> bool:
@@ -320,15 +328,22 @@ class _Run:
             rate = numbers[2 * index + 1]
             falls_now = rate < 0 and value <= -rate * SIMULTANEITY
             if by_level:
-                fires = falls_now or value < -ZERO
+                fires = falls_now or (value < -ZERO and value < -self._rounding())
             else:
                 fires = was_active and falls_now and value >= rate * SIMULTANEITY
             if fires and name not in self.fired:
                 return name
         return None
 
+    def _rounding(self) -> float:
+        """What a guard may be off by that is a difference of states."""
+        return ROUNDING * float(np.abs(self.states).max())
+
     def _start(self) -> None:
         """Refuse to start on a guard that is not crossed; fire what is due."""
+        self._decide_more(starting=True)
+        if self.outcome is not None:
+            return
         mode = self.bound.mode(self.mode)
         values = mode.evaluate(self.states, self.held)
         numbers = values[mode.code.guards].tolist()
@@ -340,7 +355,6 @@ class _Run:
                 self.outcome = Outcome(GRAZED, f"{jump.guard.name} at the start")
                 return
         self._settle(mode, values)
-        self._decide_more(by_level_only=True)
 
     def _settle(self, mode: BoundMode, values: Array) -> None:
         """Fire what is due at the start or the end, where no root is looked for."""

@@ -202,6 +202,7 @@ def _attributes(run: Run) -> dict[str, str | float]:
         "provenance": json.dumps(dict(model.source.provenance)),
         "outcome": run.outcome.name,
         "message": run.outcome.message,
+        **run.remarks,
         "tolerance": run.tolerance,
         "flexspine_version": __version__,
         "heyoka_version": heyoka.__version__,

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from flexspine.errors import InputError, ParameterError
 from flexspine.hybrid.compile import Array
-from flexspine.parameters import is_number, shortened
+from flexspine.parameters import check_seed, is_number, shortened
 
 # m; before it the ground is level, so that a run begins as it would on flat ground.
 BEGINS = 1.0
@@ -27,8 +27,8 @@ SIGHT = 1.0
 # More points than this are a slip of the pen (some 100 MB), not a wish.
 MOST_POINTS = 1_000_000
 
-# m, m/m; beyond these no height or slope means anything.
-HIGHEST, STEEPEST = 1e3, 100.0
+# m, m/m; beyond these no height or slope means anything. What is steeper is a face.
+HIGHEST, STEEPEST_SLOPE = 1e3, 100.0
 
 
 class Piece(NamedTuple):
@@ -71,10 +71,24 @@ class Ground:
             )
         if np.any(np.diff(self.xs) < 0):
             raise ParameterError(f"ground '{self.name}' goes back", "give points in order of x")
-        _check("slope", self.before, -STEEPEST, STEEPEST)
-        _check("slope", self.after, -STEEPEST, STEEPEST)
-        _check("amplitude", self.amplitude, -HIGHEST, HIGHEST)
+        self._check_faces()
+        _check("slope", self.before, -STEEPEST_SLOPE, STEEPEST_SLOPE)
+        _check("slope", self.after, -STEEPEST_SLOPE, STEEPEST_SLOPE)
         _check("wavelength", self.wavelength, 1e-3, 1e6)
+        steepest = STEEPEST_SLOPE / self.wave_number
+        _check("amplitude", self.amplitude, -steepest, steepest)
+
+    def _check_faces(self) -> None:
+        length, rise = np.diff(self.xs), np.diff(self.ys)
+        if np.any((length[1:] == 0) & (length[:-1] == 0)):
+            raise ParameterError(
+                f"ground '{self.name}' has more than two points at one x", "give two for a face"
+            )
+        if np.any((length > 0) & (np.abs(rise) > STEEPEST_SLOPE * length)):
+            raise ParameterError(
+                f"ground '{self.name}' is steeper than {STEEPEST_SLOPE:g} to 1 somewhere",
+                "give both points the same x for a vertical face",
+            )
 
     @cached_property
     def xs(self) -> Array:
@@ -121,8 +135,10 @@ class Ground:
 
     def top(self, x: float) -> float:
         """The highest ground in sight of x, or a little more, in m."""
-        first, last = np.searchsorted(self.xs, [x - SIGHT, x + SIGHT])
-        ends = [self.height(x - SIGHT), self.height(x + SIGHT)]
+        first = np.searchsorted(self.xs, x - SIGHT, side="left")
+        last = np.searchsorted(self.xs, x + SIGHT, side="right")
+        sides = ((x + way * SIGHT, ahead) for way in (-1, 1) for ahead in (True, False))
+        ends = [self.height(place, ahead=ahead) for place, ahead in sides]
         return float(max(*ends, *self.ys[first:last])) + 2 * abs(self.amplitude)
 
     def outline(self, start: float, end: float) -> Array:
@@ -148,6 +164,8 @@ class Ground:
         """``count`` steps by ``height`` m, each ``length`` m after the one before."""
         _check("length", length, 1e-3, 1e6)
         _check("count", count, 1, MOST_POINTS / 2)
+        if count != int(count):
+            raise ParameterError(f"count = {count:g} of steps is not usable", "give a whole number")
         faces = range(int(count))
         points = [(at + length * k, height * (k + up)) for k in faces for up in (0, 1)]
         return cls(f"{int(count)} steps of {height:g} m", tuple(points))
@@ -205,7 +223,7 @@ class Ground:
         """Read points of the ground from CSV, with columns x and y in m. Raises `InputError`."""
         file = Path(path)
         try:
-            with file.open(newline="", encoding="utf-8") as lines:
+            with file.open(newline="", encoding="utf-8-sig") as lines:
                 points = tuple(_points(file, csv.reader(lines)))
         except (OSError, UnicodeDecodeError, csv.Error) as failure:
             reason = getattr(failure, "strerror", None) or failure
@@ -224,9 +242,13 @@ def _check(what: str, value: float, low: float, high: float) -> None:
 def _drawn(height: float, spacing: float, length: float, seed: int) -> list[float]:
     _check("height", height, -HIGHEST, HIGHEST)
     _check("spacing", spacing, 1e-3, 1e6)
-    _check("length", length, spacing, 1e6)
-    if not (isinstance(seed, int) and seed >= 0):
-        raise ParameterError(f"seed = {seed} is not usable", "give a whole number from 0 on")
+    _check("length", length, 0, 1e6)
+    if spacing > length:
+        raise ParameterError(
+            f"spacing = {spacing:g} m is more than the ground is long, {length:.4g} m",
+            "give less, or longer ground",
+        )
+    check_seed(seed)
     count = int(length / spacing)
     if count > MOST_POINTS / 2:
         raise ParameterError(f"{count} pieces of ground are too many", "make them longer, or fewer")

@@ -13,7 +13,10 @@ from flexspine.hybrid.integrate import MAX_STEPS, ZERO, integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
+from flexspine.models.actuation import BARE
+from flexspine.models.bounder import beneath
 from flexspine.models.model import Model, check_between
+from flexspine.models.underfoot import OnGround, clearances
 from flexspine.parameters import is_number, shortened
 
 # Taylor truncation error per step; strides then repeat to some 1e-13.
@@ -35,6 +38,11 @@ class Run:
     def outcome(self) -> Outcome:
         """How the run ended."""
         return self.trajectory.outcome
+
+    @property
+    def remarks(self) -> dict[str, str]:
+        """What else there is to say of it, by name, for a dataset."""
+        return {}
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -89,6 +97,10 @@ def simulate(
     start = model.apex_state() if state is None else model.state(state, toes)
     bound = model.bind(tolerance)
     _refuse_impossible(bound, start)
+    if isinstance(bound, OnGround):
+        for point, clear in clearances(bound, start, beneath(model.kind.body(BARE))):
+            if not clear > 0:
+                raise _grounded(f"{point} on the ground", clear)
     trajectory = integrate(
         bound,
         start,
@@ -118,12 +130,15 @@ def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:
     for jump in mode.code.jumps:
         guard, value = jump.guard, guards[jump.value]
         if guard.ends is not None and not value > 0:
-            raise StateError(
-                f"the start has the {guard.name} ({value:.4g} m)",
-                "raise the apex height or lower the pitch",
-            )
+            raise _grounded(guard.name, value)
         if guard.jumps and guard.arming is Arming.LEVEL and value < -ZERO:
             raise StateError(
                 f"the start is past the {guard.name}, the leg would pull",
                 "put its toe nearer to the hip, or leave it out of toes",
             )
+
+
+def _grounded(what: str, clear: float) -> StateError:
+    return StateError(
+        f"the start has the {what} ({clear:.4g} m)", "raise the apex height or lower the pitch"
+    )

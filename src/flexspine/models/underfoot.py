@@ -7,7 +7,7 @@ sight instead, until they come as low as that.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from typing import NamedTuple
 
@@ -138,6 +138,17 @@ def _where(below: Underfoot, bound: BoundSystem, point: HybridState) -> tuple[fl
     tag = below.point.replace(" ", "_")
     table = bound.observe(point.mode, point.states[None], point.held)
     return float(table[f"{tag}_x"][0]), float(table[f"{tag}_y"][0])
+
+
+def clearances(
+    bound: OnGround, point: HybridState, points: Iterable[Underfoot]
+) -> Iterator[tuple[str, float]]:
+    """How high points of the body, not toes, are above the ground, in m."""
+    ground = _ground(bound)
+    for below in points:
+        if below not in TOES.values():
+            x, y = _where(below, bound, point)
+            yield below.point, y - ground.height(x)
 
 
 def _looks(

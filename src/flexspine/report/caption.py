@@ -21,6 +21,9 @@ CONTROLLERS = {
     "pd": "joint springs and dampers",
 }
 
+# What a run under feedback has to say.
+REMARKS = ("steered", "noise on what is steered", "noise on the apex")
+
 WIDE = 115  # letters in a line of small type over a robot's pictures
 LONGEST_NAME = 60  # letters; what fits into a line of a title
 
@@ -38,7 +41,10 @@ def describe(dataset: xr.Dataset) -> list[str]:
     if any(given.get(f"{side}.leg.damping") for side in SIDES):
         parts += of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
     angles = json.loads(dataset.attrs.get("touchdown_angles", "{}"))
-    if angles:
+    told = [name for name in REMARKS if name in dataset.attrs]
+    if told:
+        parts += [f"{name}: {dataset.attrs[name]}" for name in told]
+    elif angles:
         both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
         parts.append(f"touchdown angles: {both}")
     parts.append(f"energy at the start {float(dataset['total_energy'][0]):.4g} J")

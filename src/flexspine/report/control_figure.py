@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,8 +63,9 @@ def plot_control(record: Mapping[str, Any], table: Sequence[Mapping[str, float]]
         rest = list(every[1:])
         if angles:
             _draw_angles(rest.pop(0), columns, angles, record)
-        for axes, name, color in zip(rest, others, OTHER_COLORS, strict=False):
-            _draw_input(axes, columns["stride"], columns[name], name, color)
+        for axes, name, color in zip(rest, others, cycle(OTHER_COLORS), strict=False):
+            usual = record["usual"][record["inputs"].index(name)]
+            _draw_input(axes, columns["stride"], columns[name], usual, name, color)
         every[-1].set_xlabel("stride")
         add_title(figure, _heading(record), details)
     return figure
@@ -126,9 +128,9 @@ def _draw_angles(
     add_legend(axes)
 
 
-def _draw_input(axes: Axes, strides: Any, values: Any, name: str, color: str) -> None:
+def _draw_input(axes: Axes, strides: Any, values: Any, usual: float, name: str, color: str) -> None:
     length = name.endswith((".extension", ".hip_lever"))
-    shown = 1000 * values if length else values
-    axes.plot(strides, shown, color=color, **_style(len(values)))
-    axes.axhline(0, color=FAINT, linewidth=0.7, zorder=1)
-    axes.set_ylabel(f"{name}\n({'mm' if length else 'SI'})")
+    factor, unit = (1000.0, " (mm)") if length else (1.0, "")
+    axes.plot(strides, factor * values, color=color, **_style(len(values)))
+    axes.axhline(factor * usual, color=FAINT, linewidth=0.7, zorder=1)
+    axes.set_ylabel(name.replace(".", ".\n") + unit)

@@ -19,17 +19,11 @@ LETTERS = 105  # of small type; what fits into a line
 
 
 def plot_distances(found: Wayfaring, record: Mapping[str, Any]) -> Figure:
-    """Draw which share of the runs is still running after so many metres.
-
-    Runs that made all their strides ended without a fall; from there on the line is left away.
-    """
-    ended = np.sort([f.distance for f in found.fates if not f.survived])
-    whole = len(found.fates)
-    safe = min((f.distance for f in found.fates if f.survived), default=None)
-    last = safe if safe is not None else float(ended[-1])
-    seen = ended[ended <= last]
-    steps = np.concatenate([[0.0], seen, [last]])
-    share = 1 - np.concatenate([np.arange(len(seen) + 1), [len(seen)]]) / whole
+    """Draw which share of the runs is still going after so many metres (Kaplan-Meier)."""
+    distances, going = found.going()
+    last = float(found.distances.max())
+    steps = np.concatenate([[0.0], distances, [last]])
+    share = np.concatenate([[1.0], going, going[-1:]])
     with themed():
         details = joined(_details(found, record), LETTERS)
         figure = Figure(figsize=(WIDTH, HEIGHT + LINE * len(details)), layout="constrained")
@@ -44,7 +38,7 @@ def plot_distances(found: Wayfaring, record: Mapping[str, Any]) -> Figure:
         if median is not None and median <= last:
             axes.plot([0, median, median], [50, 50, 0], color=FAINT, linewidth=0.8)
             axes.annotate(
-                f"half have fallen by {median:.1f} m", (median, 50), (6, 4),
+                f"half have ended by {median:.1f} m", (median, 50), (6, 4),
                 textcoords="offset points", fontsize=SMALL_SIZE, color=INK,
             )  # fmt: skip
         add_title(figure, _heading(found, record), details)

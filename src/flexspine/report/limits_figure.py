@@ -59,7 +59,7 @@ def plot_limits(cells: Sequence[Cell]) -> Figure:
                             *np.transpose(here), color=shades[stiffness], marker="o",
                             markersize=3.5, linewidth=1.1, label=f"{stiffness:g}",
                         )  # fmt: skip
-                axes.set_ylim(bottom=0)
+            row[0].set_ylim(bottom=0)
         for axes, design in zip(panels[0], designs, strict=True):
             axes.set_title(design)
         for axes in panels[-1]:

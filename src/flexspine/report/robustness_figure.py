@@ -7,12 +7,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from flexspine.report.style import FAINT, GREEN, INK, LINE, ORANGE, PURPLE, add_title, themed
+from flexspine.report.style import (
+    FAINT,
+    GREEN,
+    INK,
+    LINE,
+    ORANGE,
+    PURPLE,
+    add_legend,
+    add_title,
+    themed,
+)
 
 if TYPE_CHECKING:
     from flexspine.studies.robustness import Robustness
 
-WIDTH, HEIGHT = 7.6, 3.8  # in
+WIDTH, HEIGHT = 8.6, 3.8  # in
 
 COLORS = (INK, ORANGE, GREEN, PURPLE)
 MARKERS = ("s", "o", "^", "D")
@@ -27,7 +37,8 @@ def plot_robustness(found: Robustness) -> Figure:
     with themed():
         runs = len(next(iter(found.animals.values())).fates)
         details = [
-            f"{runs:,} runs of each, the same disturbances; survived: {found.strides} strides made",
+            f"{runs:,} run{'s' * (runs != 1)} of each, the same disturbances; "
+            f"survived: {found.strides} strides made",
             "bands: 95 % intervals (Wilson)",
         ]
         figure = Figure(figsize=(WIDTH, HEIGHT + LINE * len(details)), layout="constrained")
@@ -51,6 +62,6 @@ def plot_robustness(found: Robustness) -> Figure:
             axes.axvline(0, color=FAINT, linewidth=0.7, zorder=1)
         axes.set_xlabel(f"{found.kind.about} ({unit})")
         axes.set_ylabel("survived (%)")
-        axes.legend(loc="lower center" if found.kind.signed else "upper right")
+        add_legend(axes)
         add_title(figure, "Survival under the same controller", details)
     return figure

@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
+from matplotlib.patches import Polygon, Rectangle
 from matplotlib.ticker import MultipleLocator
 
 from flexspine.report.caption import describe, ending, heading
@@ -208,7 +208,11 @@ def draw_ground(
     axes.plot(*outline.T, color=INK, linewidth=1.0, zorder=2.5)
     depth = 0.35 * step
     strokes = [[(at, top), (at - depth, top - depth)] for at, top in zip(x, y, strict=True)]
-    axes.add_collection(LineCollection(strokes, colors=FAINT, linewidths=0.8, zorder=1))
+    lines = LineCollection(strokes, colors=FAINT, linewidths=0.8, zorder=1)
+    axes.add_collection(lines)
+    lines.set_clip_path(
+        Rectangle((reach[0], -1e3), reach[1] - reach[0], 2e3, transform=axes.transData)
+    )
 
 
 def add_force_key(

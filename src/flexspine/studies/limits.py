@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from flexspine.control.disturbance import disturbance, endure
+from flexspine.control.disturbance import Draw, disturbance, endure
 from flexspine.control.stabilize import Stabilizer, stabilize
 from flexspine.errors import FlexspineError, ParameterError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.problem import ANGLES
 from flexspine.gaits.stability import floquet_multipliers
-from flexspine.models.model import Model
+from flexspine.models.model import Model, check_between
 from flexspine.models.simulation import check_count
 from flexspine.studies.following import Line, LostGaitError, carried
 from flexspine.workers.lasting import do_all
@@ -96,7 +97,7 @@ def largest(stabilizer: Stabilizer, limit: Limit) -> float:
 
     def fine(size: float) -> bool:
         return all(
-            endure(stabilizer, kind, limit.sign * size, where, seed, limit.strides).survived
+            endure(stabilizer, kind, Draw(limit.sign * size, where, seed), limit.strides).survived
             for where, seed in limit.tries
         )
 
@@ -142,8 +143,7 @@ def find_limits(
     ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
     share the work without a change to results. Raises `ParameterError` and `OutputError`.
     """
-    if not (stiffnesses and speeds):
-        raise ParameterError("no stiffness or no speed is given", "give at least one of each")
+    _check(model, stiffnesses, speeds)
     pieces = [
         _Piece(stiffness, speed, gait, design, tuple(limits), reason)
         for stiffness, speed, gait, reason in _gaits(model, stiffnesses, speeds)
@@ -164,6 +164,16 @@ def find_limits(
         to_json=vars,
         from_json=lambda cell: Cell(**cell),
     )  # fmt: skip
+
+
+def _check(model: Model, stiffnesses: Sequence[float], speeds: Sequence[float]) -> None:
+    if not (stiffnesses and speeds):
+        raise ParameterError("no stiffness or no speed is given", "give at least one of each")
+    if "spine.stiffness" not in model.parameter_names:
+        raise ParameterError(f"'{model.name}' has no spine that bends", "give another model")
+    for name, given in (("stiffness", stiffnesses), ("speed", speeds)):
+        for value in given:
+            check_between(name, value, 0, inf)
 
 
 def _gaits(

@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexspine.control.disturbance import Disturbance, Fate, disturbance, draw, endure
+from flexspine.control.disturbance import Disturbance, Draw, Fate, disturbance, draw, endure
 from flexspine.control.stabilize import Stabilizer
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
-from flexspine.parameters import is_finite, shortened, values
+from flexspine.parameters import check_seed, is_finite, shortened, values
 from flexspine.workers.lasting import do_all
 
 # Runs that are done, and kept, together: some seconds of work.
@@ -33,6 +33,8 @@ QUANTILE = 1.959963984540054
 
 # To each side.
 BINS = 20
+
+MOST_RUNS = 10_000_000
 
 
 class Bin(NamedTuple):
@@ -64,7 +66,7 @@ class Endurance:
         return np.array([fate.survived for fate in self.fates], dtype=bool)
 
     def safe(self, sign: int) -> float | None:
-        """The size up to which every run survived, to one side; None if all did."""
+        """The size up to which every run survived, to one side; None if all did, or none was."""
         sizes, fine = self._side(sign)
         if fine.all():
             return None
@@ -73,7 +75,7 @@ class Endurance:
     def typical(self, sign: int) -> float | None:
         """The size that tells best who survives from who does not, to one side; None if all do.
 
-        As many runs as can be survived below it and failed above it.
+        None as well without runs. As many as can be survived below it and failed above it.
         """
         sizes, fine = self._side(sign)
         if fine.all():
@@ -174,10 +176,12 @@ def survive(
         raise ParameterError(
             f"largest = {shortened(largest)} is not usable", "give a number above zero"
         )
-    if not (isinstance(seed, int) and seed >= 0):
-        raise ParameterError(f"seed = {seed} is not usable", "give a whole number from 0 on")
-    check_count("runs", runs)
+    check_seed(seed)
+    check_runs(runs)
     check_count("strides", strides)
+    for each in animals.values():  # what cannot be made is refused before anything is done
+        for sign in (1, -1) if what.signed else (1,):
+            what.make(each.gait, Draw(sign * largest, 0.5, seed), strides)
     pieces = [
         _Piece(name, stabilizer, kind, largest, strides, seed, first, min(CHUNK, runs - first))
         for first in range(0, runs, CHUNK)
@@ -192,14 +196,15 @@ def survive(
         store=store,
         description={
             "kind": kind, "largest": largest, "runs": runs, "strides": strides, "seed": seed,
-            "animals": {
-                name: {**about(each.gait.model), **each.settings} for name, each in animals.items()
-            },
+            "animals": [
+                [name, {**about(each.gait.model), **each.settings}]
+                for name, each in animals.items()
+            ],
         },
         to_json=list,
         from_json=lambda rows: [Fate(*row) for row in rows],
     )  # fmt: skip
-    sizes = np.array([draw(what, largest, seed, k)[0] for k in range(runs)])
+    sizes = np.array([draw(what, largest, seed, k).size for k in range(runs)])
     found = {
         name: Endurance(
             sizes,
@@ -215,6 +220,13 @@ def survive(
     return Robustness(what, largest, strides, seed, found)
 
 
+def check_runs(runs: int) -> int:
+    """Return a number of runs. Raises `ParameterError` for none, and for more than memory holds."""
+    if check_count("runs", runs) > MOST_RUNS:
+        raise ParameterError(f"runs = {runs} are too many", f"give no more than {MOST_RUNS}")
+    return runs
+
+
 def about(model: Model) -> dict[str, Any]:
     """All that decides what a model does."""
     return {
@@ -228,6 +240,6 @@ def about(model: Model) -> dict[str, Any]:
 def _run_piece(piece: _Piece) -> list[Fate]:
     kind = disturbance(piece.kind)
     return [
-        endure(piece.stabilizer, kind, *draw(kind, piece.largest, piece.seed, k), piece.strides)
+        endure(piece.stabilizer, kind, draw(kind, piece.largest, piece.seed, k), piece.strides)
         for k in range(piece.first, piece.first + piece.runs)
     ]

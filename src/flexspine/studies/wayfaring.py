@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.stats import CensoredData, ecdf
 
 from flexspine.control.disturbance import Fate
 from flexspine.control.steering import SteeredRun, Steering, steer
@@ -16,11 +18,14 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
-from flexspine.studies.robustness import about
+from flexspine.studies.robustness import about, check_runs
 from flexspine.workers.lasting import do_all
 
 # Runs that are done, and kept, together.
 CHUNK = 20
+
+# Of a share.
+ROUNDING = 1e-12
 
 # Ground is made so much longer than an undisturbed run, for those that get faster.
 RESERVE = 1.5
@@ -31,18 +36,25 @@ class Terrain:
     """A kind of ground with its numbers, from which ground is made for each seed.
 
     ``kind`` is step, stairs, ramp, slope, waves, rough, blocks or the path of a CSV file. The seed
-    draws what is random, and where within a stride it begins; that of a file is its own.
+    draws what is random, and where within a stride it begins; a file is as it is.
     """
 
     kind: str
     numbers: Mapping[str, float]
 
+    @cached_property
+    def track(self) -> Ground | None:
+        """The ground of a file, read once. Raises `InputError`."""
+        if not self.kind.endswith(".csv"):
+            return None
+        if self.numbers:
+            raise ParameterError("ground from a file has no numbers", "leave them away")
+        return Ground.read(self.kind)
+
     def ground(self, seed: int, stride: float, strides: int) -> Ground:
         """The ground for a seed, strides of ``stride`` m. Raises `InputError`."""
-        if self.kind.endswith(".csv"):
-            if self.numbers:
-                raise ParameterError("ground from a file has no numbers", "leave them away")
-            return Ground.read(self.kind)
+        if self.track is not None:
+            return self.track
         if self.kind not in KINDS:
             raise UnknownNameError("kind of ground", self.kind, KINDS)
         make, known = KINDS[self.kind]
@@ -52,7 +64,7 @@ class Terrain:
         given: dict[str, Any] = {**known, **self.numbers}
         if self.kind in RANDOM:
             given |= {"length": RESERVE * stride * strides + BEGINS, "seed": seed}
-        where = float(np.random.default_rng(seed).uniform())
+        where = float(np.random.default_rng([seed, 1]).uniform())  # not what draws heights
         return make(**given, at=BEGINS + where * stride)
 
 
@@ -94,14 +106,24 @@ class Wayfaring:
         names = [fate.outcome for fate in self.fates]
         return {name: names.count(name) for name in sorted(set(names))}
 
+    def going(self) -> tuple[Array, Array]:
+        """The share of runs that are still going after some distances (m), each shape (k,).
+
+        Kaplan and Meier's estimate (1958, J Am Stat Assoc 53:457-481): runs that made all their
+        strides say nothing about what lies beyond.
+        """
+        arrived = np.array([fate.survived for fate in self.fates])
+        found = ecdf(CensoredData.right_censored(self.distances, arrived)).sf
+        return found.quantiles, found.probabilities
+
     def quantile(self, share: float) -> float | None:
-        """The distance (m) before which this share of all runs ended; None if fewer ended."""
-        ended = sorted(f.distance for f in self.fates if not f.survived)
-        needed = int(np.ceil(share * len(self.fates)))
-        return ended[needed - 1] if 0 < needed <= len(ended) else None
+        """The distance (m) by which this share of runs ended early; None if none did so far."""
+        distances, going = self.going()
+        there = np.flatnonzero(going <= 1 - share + ROUNDING)
+        return float(distances[there[0]]) if there.size else None
 
     def metres_per_fall(self) -> float | None:
-        """All distance over all falls, in m; None without a fall."""
+        """All distance over all runs that ended early, in m; None without any."""
         falls = len(self.fates) - self.arrived
         return float(self.distances.sum()) / falls if falls else None
 
@@ -148,9 +170,13 @@ def distance_to_fall(
     ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
     share the work without a change to results. Raises `InputError`.
     """
-    check_count("runs", runs)
+    check_runs(runs)
     check_count("strides", strides)
     terrain.ground(seed, stride, strides)  # refused before anything is done
+    if terrain.track is not None and runs > 1:
+        raise ParameterError(
+            f"ground from '{terrain.kind}' is the same in all {runs} runs", "run over it once"
+        )
     pieces = [
         _Piece(
             model, steering, terrain, stride, strides,

@@ -33,7 +33,8 @@ class Journal:
         self.lines: list[Line] = []
         header = json.loads(json.dumps(description))
         try:
-            if path.exists():
+            # Whoever was stopped before the first line has left an empty file.
+            if path.exists() and path.stat().st_size:
                 self._read(header, kind, is_line)
             else:
                 path.write_text(json.dumps(header) + "\n", encoding="utf-8")
@@ -45,9 +46,9 @@ class Journal:
             ) from None
 
     def _read(self, header: Line, kind: str, is_line: Callable[[Any], bool]) -> None:
-        rest = ""
+        content = self.path.read_bytes()
+        whole, _, rest = content.rpartition(b"\n")
         try:
-            whole, _, rest = self.path.read_text(encoding="utf-8").rpartition("\n")
             first, *lines = [json.loads(line) for line in whole.splitlines()] or [None]
         except ValueError:
             first, lines = None, []
@@ -57,7 +58,8 @@ class Journal:
                 "give another place, or delete it to begin anew",
             )
         if rest:
-            self.path.write_text(whole + "\n", encoding="utf-8")
+            with self.path.open("r+b") as file:
+                file.truncate(len(content) - len(rest))
         self.lines = lines
 
     def add(self, line: Line) -> None:
