@@ -85,3 +85,13 @@ def test_drawing_leaves_the_data_alone(data: xr.Dataset) -> None:
     plot_run(data)
     strip(data)
     xr.testing.assert_identical(data, before)
+
+
+def test_energy_of_an_actuated_run_adds_up_to_what_it_had_and_was_given(flexible: Model) -> None:
+    run = simulate(flexible.with_values({"legs.extension": 0.01, "spine.damping": 1.0}))
+    data = to_dataset(run)
+    lines = [line for axes in plot_run(data).axes for line in axes.get_lines()]
+    (given,) = [line for line in lines if line.get_label() == "start and work"]
+    whole = data["total_energy"].values + data["dissipated_energy"].values
+    assert np.asarray(given.get_ydata()) == pytest.approx(100 * whole / whole[0], rel=1e-9)
+    assert whole[-1] > 1.02 * whole[0]

@@ -140,6 +140,12 @@ def _report(record: dict[str, Any]) -> str:
             f"  energy           {energy['initial']:.4f} J, balance closed to "
             f"{energy['relative_drift']:.1e}"
         )
+    lines += [
+        f"  {name.replace('_', ' '):<16} {work['positive']:.4f} J given, {work['net']:.4f} J net"
+        for name, work in record["work"].items()
+    ]
+    if record["work"] and record["cost_of_transport"] is not None:
+        lines.append(f"  cost of transport {record['cost_of_transport']:.5f}")
     return "\n".join(lines)
 
 

@@ -134,7 +134,10 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
         time, [shares[name] for name in shown], labels=shown, linewidth=0,
         colors=[ENERGY_COLORS[name] for name in shown],
     )  # fmt: skip
-    axes.set_ylim(0, 100)
+    given = _given(dataset)
+    if given is not None:
+        axes.plot(time, given, color=INK, linewidth=1.0, label="start and work")
+    axes.set_ylim(0, 100 if given is None else max(100.0, float(given.max()) + 2))
     axes.set_yticks([0, 25, 50, 75, 100])
     axes.set_ylabel("energy (% of\ninitial total)")
     add_legend(axes, *_reversed(axes))
@@ -149,6 +152,16 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
     elastic.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     elastic.set_ylabel("enlarged, not\nstacked (%)")
     add_legend(elastic)
+
+
+def _given(dataset: xr.Dataset) -> Array | None:
+    """What there was and what actuators have put in since, in % of the initial total."""
+    works = [dataset[str(name)].values for name in dataset if str(name).endswith("_work")]
+    if not works:
+        return None
+    total = float(dataset["total_energy"][0])
+    given: Array = 100 * (1 + np.sum(works, axis=0) / total)
+    return given
 
 
 def _shares(dataset: xr.Dataset) -> dict[str, Array]:
