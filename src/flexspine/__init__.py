@@ -43,12 +43,15 @@ if TYPE_CHECKING:
     from flexspine.report.coordinates_figure import plot_coordinates
     from flexspine.report.figure import plot_run
     from flexspine.report.map_figure import plot_map
+    from flexspine.report.pareto_figure import plot_fronts
     from flexspine.report.pinned_figure import plot_pinned
     from flexspine.report.robot_figure import plot_robot
     from flexspine.report.robustness_figure import plot_robustness
     from flexspine.studies.basin import Basin, basin_plan, read_basins
+    from flexspine.studies.front_record import front_record
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
     from flexspine.studies.limits import find_limits
+    from flexspine.studies.optimise import Optimisation, optimise
     from flexspine.studies.pinned_check import PinnedCheck, check_pinned
     from flexspine.studies.plan import Plan
     from flexspine.studies.plan_file import read_plan
@@ -72,6 +75,7 @@ _HOMES = {
     "MachineError": "errors",
     "Model": "models.model",
     "Noise": "control.steering",
+    "Optimisation": "studies.optimise",
     "Pace": "control.walk_plan",
     "PinnedCheck": "studies.pinned_check",
     "Plan": "studies.plan",
@@ -99,12 +103,15 @@ _HOMES = {
     "find_limits": "studies.limits",
     "floquet_multipliers": "gaits.stability",
     "force_family": "control.distribution",
+    "front_record": "studies.front_record",
     "load_gait": "gaits.files",
     "load_model": "models.presets",
     "load_robot": "models.robot_file",
     "map_plan": "studies.gait_map",
+    "optimise": "studies.optimise",
     "plot_basin": "report.basin_figure",
     "plot_coordinates": "report.coordinates_figure",
+    "plot_fronts": "report.pareto_figure",
     "plot_map": "report.map_figure",
     "plot_pinned": "report.pinned_figure",
     "plot_robot": "report.robot_figure",
@@ -153,6 +160,7 @@ __all__ = [
     "MachineError",
     "Model",
     "Noise",
+    "Optimisation",
     "Pace",
     "PinnedCheck",
     "Plan",
@@ -181,12 +189,15 @@ __all__ = [
     "find_limits",
     "floquet_multipliers",
     "force_family",
+    "front_record",
     "load_gait",
     "load_model",
     "load_robot",
     "map_plan",
+    "optimise",
     "plot_basin",
     "plot_coordinates",
+    "plot_fronts",
     "plot_map",
     "plot_pinned",
     "plot_robot",

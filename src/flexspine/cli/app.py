@@ -23,6 +23,7 @@ from flexspine.cli import (
     gait,
     gait_map,
     limits,
+    optimise,
     presets,
     robustness,
     study,
@@ -67,6 +68,7 @@ app.command("control")(control.control)
 app.command("terrain")(terrain.terrain)
 app.command("robustness")(robustness.robustness)
 app.command("limits")(limits.limits)
+app.command("optimise")(optimise.optimise)
 app.command("trot")(trot.trot)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)

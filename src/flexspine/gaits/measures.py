@@ -45,6 +45,14 @@ class Work(NamedTuple):
     net: float
 
 
+class Turn(NamedTuple):
+    """A time (s) at which a quantity turns round, its value there, whether it is a least one."""
+
+    time: float
+    value: float
+    least: bool
+
+
 @dataclass(frozen=True)
 class Summary:
     """The measures of a run. Lengths in m, times in s, forces in N per pair of legs, angles in rad.
@@ -139,6 +147,7 @@ class Profile:
     """Ranges and means of observables and states over a recorded run, to rounding error."""
 
     def __init__(self, run: Run) -> None:
+        self._begins = [arc.times[:-1] for arc in run.trajectory.arcs]
         self._steps = [np.diff(arc.times) for arc in run.trajectory.arcs]
         self._tables = [_nodal(run, arc) for arc in run.trajectory.arcs]
 
@@ -174,6 +183,23 @@ class Profile:
         """Return the value at the start."""
         return float(self._tables[0][name][0, 0])
 
+    def turns(self, name: str) -> list[Turn]:
+        """Return where it turns round within arcs, in order."""
+        found: list[Turn] = []
+        for begin, steps, table in zip(self._begins, self._steps, self._tables, strict=True):
+            for start, step, row in zip(begin, steps, table[name], strict=True):
+                slopes = np.diff(row)
+                if not slopes.min() < 0 < slopes.max():
+                    continue
+                series = _INTERPOLATE @ row
+                at = _turning_points(series)
+                values_ = chebyshev.chebval(at, series)
+                bends = chebyshev.chebval(at, chebyshev.chebder(series, 2))
+                times = start + step * (at + 1) / 2
+                rows = zip(times.tolist(), values_.tolist(), (bends > 0).tolist(), strict=True)
+                found += [Turn(*each) for each in rows]
+        return found
+
 
 def _nodal(run: Run, arc: Arc) -> dict[str, Array]:
     """Every quantity at the Chebyshev points of each step of an arc, shape (steps, points)."""
@@ -208,9 +234,14 @@ def _turning_values(samples: Array) -> Array:
 
 def _turns(series: Array) -> Array:
     """The values of a Chebyshev series where it turns round, in order."""
+    return np.asarray(chebyshev.chebval(_turning_points(series), series), dtype=float)
+
+
+def _turning_points(series: Array) -> Array:
+    """Where a Chebyshev series turns round, in order."""
     turns = chebyshev.chebroots(chebyshev.chebder(series))
-    inside = turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)]
-    return np.asarray(chebyshev.chebval(np.sort(inside), series), dtype=float)
+    inside: Array = turns.real[(np.abs(turns.imag) < _REAL) & (np.abs(turns.real) <= 1)]
+    return np.sort(inside)
 
 
 def _polished(samples: Array, sign: float) -> float:

@@ -30,14 +30,14 @@ PATIENCE, PROGRESS = 4, 0.8
 
 @dataclass(frozen=True)
 class Slice:
-    """One more linear equation: ``direction . (point - anchor) = 0``."""
+    """More linear equations: ``direction . (point - anchor) = 0``, of one direction or of rows."""
 
     direction: Array
     anchor: Array
 
-    def __call__(self, point: Array) -> float:
-        """How far a point is off, in natural units."""
-        return float(self.direction @ (point - self.anchor))
+    def __call__(self, point: Array) -> Array:
+        """How far a point is off in each direction, in natural units."""
+        return np.atleast_1d(self.direction @ (point - self.anchor))
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def solve(
     """Solve a problem from a start, in natural units.
 
     Takes least-squares steps, so an equation too many that follows from the others does no harm;
-    ``cut`` adds one that picks a point of a family.
+    ``cut`` adds some that pick a point of a family.
     """
     here = _evaluate(problem, start, cut)
     linear: Linear | None = None
@@ -89,6 +89,8 @@ def solve(
         reused = linear is not None and fast
         if linear is None or not fast:
             linear = problem.linearize(here.evaluation)
+        if not np.isfinite(linear.matrix).all():  # deviations grew beyond what a double holds
+            return attempt(count, "stalled", here)
         step = _step(linear.matrix, here, cut)
         longest = float(np.max(np.abs(step)))
         if longest > longest_step:
@@ -124,7 +126,9 @@ class _Trial(NamedTuple):
 
 def _evaluate(problem: Problem, point: Array, cut: Slice | None) -> _Trial:
     evaluation = problem.evaluate(point)
-    norm = evaluation.norm if cut is None else max(evaluation.norm, abs(cut(point)))
+    norm = evaluation.norm
+    if cut is not None:
+        norm = max(norm, float(np.max(np.abs(cut(point)))))
     return _Trial(point, evaluation, norm)
 
 
@@ -142,8 +146,8 @@ def _step(jacobian: Array, here: _Trial, cut: Slice | None) -> Array:
     residual = here.evaluation.residual
     assert residual is not None
     if cut is not None:
-        row = cut.direction[None]
-        return _least_squares(np.vstack([jacobian, row]), np.append(residual, cut(here.point)))
+        rows = np.vstack([jacobian, cut.direction])
+        return _least_squares(rows, np.append(residual, cut(here.point)))
     return _least_squares(jacobian, residual)
 
 

@@ -253,8 +253,8 @@ class Problem:
             parameters[row] = self._counted[name].value(float(point[column]))
         return self._base_states + self._state_moves @ point, parameters
 
-    def evaluate(self, point: Array) -> Evaluation:
-        """Run from a point and evaluate the equations."""
+    def evaluate(self, point: Array, *, record: bool = False) -> Evaluation:
+        """Run from a point and evaluate the equations; ``record`` keeps dense output."""
         states, parameters = self.expand(point)
         bound = BoundSystem(self.compiled, parameters)
         reversal = self.system.reversal
@@ -265,6 +265,7 @@ class Problem:
             section=reversal.middle if self.symmetric and reversal else None,
             section_timeout=LONGEST_STRIDE,
             max_steps=MOST_STEPS,
+            record=record,
         )
         if not trajectory.outcome.completed:
             return Evaluation(None, trajectory, bound)

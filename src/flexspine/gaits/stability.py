@@ -96,9 +96,13 @@ def floquet_multipliers(gait: Gait, linear: ReturnMap | None = None) -> Stabilit
             f"there is no gait to linearise: {gait.flaw}",
             "find one first; stride_map differentiates any stride",
         )
+    return linear_stability(gait, linear or linearize(gait.trajectory))
+
+
+def linear_stability(gait: Gait, linear: ReturnMap) -> Stability:
+    """The same of a stride that need not close, where it is looked at next to a gait."""
     section = gait.model.system.section
-    result = linear or linearize(gait.trajectory)
-    jacobian = result.by_state
+    jacobian = linear.by_state
     scales = np.array([gait.model.scales[name] for name in section.coordinates])
     scaled = jacobian * scales / scales[:, None]
     values, vectors = np.linalg.eig(scaled)
@@ -115,7 +119,7 @@ def floquet_multipliers(gait: Gait, linear: ReturnMap | None = None) -> Stabilit
         jacobian_error=SAFETY * gait.tolerance * float(np.linalg.norm(scaled, 2)),
         energy_identity=identity,
         energy_gradient=gradient,
-        crossing_rates=result.crossing_rates,
+        crossing_rates=linear.crossing_rates,
     )
 
 
