@@ -120,6 +120,17 @@ def test_stability_is_traded_for_peak_force_as_a_scan_of_stiffness_has_it(publis
     assert found.told is None
 
 
+def test_where_nothing_is_lost_the_front_is_one_gait(published: Gait) -> None:
+    """Without dampers a gait costs nothing, whatever force it takes."""
+    found = optimise(
+        published, SPEED, ranges={"spine.stiffness": (250.0, 280.0)}, spines=(CONSTANT,), draws=0
+    )
+    (point,) = found.fronts[CONSTANT].points
+    assert point.values[COST] == 0
+    assert point.gait.model.numbers["spine.stiffness"] == 280
+    assert point.values[PEAK_GRF] < max(found.reference.peak_grf.values())
+
+
 def test_stiffness_by_phase_is_never_worse(found: Optimisation) -> None:
     constant, phased = found.fronts[CONSTANT], found.fronts[BY_PHASE]
     assert len(constant.points) >= 2

@@ -121,7 +121,10 @@ class Place:
     @cached_property
     def missed(self) -> float:
         """By how much it misses what it is bound to; at most `MET` where it does not."""
-        over = [self.value(name) / limit - 1 for name, limit in self.task.limits.items()]
+        over = [
+            (self.value(name) - limit) / (abs(limit) or 1.0)
+            for name, limit in self.task.limits.items()
+        ]
         return float(max([*over, *-self.room, *-self.spare]))
 
 
@@ -192,10 +195,9 @@ class _Local:
             parts.max(axis=1) / scale
             for parts, scale in zip(self.start.parts, self.scales, strict=True)
         ]
-        count = sum(self.sizes)
-        ends = [(-self.width, self.width)] * self.d + [(None, None)] * count
-        rise = np.concatenate([np.zeros(self.d), np.ones(self.sizes[0])])
-        rise = np.append(rise, np.zeros(self.d + count - len(rise)))
+        ends = [(-self.width, self.width)] * self.d + [(None, None)] * sum(self.sizes)
+        rise = np.zeros(len(ends))
+        rise[self.d : self.d + self.sizes[0]] = 1.0
         try:
             minimize(
                 lambda v: float(rise @ v),
