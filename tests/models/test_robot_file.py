@@ -129,6 +129,12 @@ BAD = {
                          ("gravty", "gravity")),
     "a title that is a number": ("title = 3\n" + PENDULUM, ("title",)),
     "notes that are a text": ('notes = "all"\n' + PENDULUM, ("notes",)),
+    "a space that is a number": ("space = 3\n" + PENDULUM, ("'space' is not a table",)),
+    "an unknown entry of space": (PENDULUM + "[space]\nhip_widht = 0.1\n",
+                                  ("space", "hip_widht")),
+    "a width that is missing": (PENDULUM + "[space]\nhip_width = 0.1\n", ("space", "trunk_width")),
+    "a negative width": (PENDULUM + "[space]\nhip_width = -0.1\n", ("space", "hip_width", "-0.1")),
+    "a link named space": (changed('[links.bob]', "[links.space]"), ("named 'space'",)),
     "no TOML": ("links = [", ("not valid TOML",)),
 }  # fmt: skip
 

@@ -114,7 +114,7 @@ def _rows(case: PinnedCase) -> list[dict[str, Any]]:
 
 
 def _record(check: PinnedCheck) -> dict[str, Any]:
-    from flexspine.engines.mujoco_planar import mujoco_version
+    from flexspine.engines.installed import mujoco_version
     from flexspine.studies.pinned_check import ALLOWED, COMPARED, ORDERS
 
     return {
@@ -163,7 +163,7 @@ def _balance(case: PinnedCase) -> list[tuple[float, dict[str, float], float]]:
 
 def _report(check: PinnedCheck) -> str:
     """For a person."""
-    from flexspine.engines.mujoco_planar import mujoco_version
+    from flexspine.engines.installed import mujoco_version
 
     lines = [
         f"{check.robot.name} pinned by {check.foot} and let go from a crouch, motors limp; "

@@ -6,25 +6,15 @@ constraints are springs, and would let it give way.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexspine.errors import MachineError
+from flexspine.engines.installed import LEAST_INERTIA, mujoco_module
 from flexspine.mechanics.linkage import Array, Link, Linkage
 from flexspine.mechanics.rerooting import rerooted
-
-# Versions from the first up to the second: 4.0.0 gets accelerations wrong.
-VERSIONS = (3, 17), (4, 0)
-
-REMEDY = "pip install 'mujoco>=3.17,<4', or flexspine with the extra 'engine'"
-
-# kg m^2; MuJoCo takes no body without inertia, and this much is less than rounding errors.
-LEAST_INERTIA = 2e-15
 
 
 class Motion(NamedTuple):
@@ -45,7 +35,7 @@ class PinnedMujoco:
     """
 
     def __init__(self, linkage: Linkage, foot: str) -> None:
-        self._mujoco = _mujoco()
+        self._mujoco = mujoco_module()
         self._tree = rerooted(linkage, foot)
         self.model = _specification(self._mujoco, self._tree).compile()
         self.data = self._mujoco.MjData(self.model)
@@ -92,27 +82,6 @@ class PinnedMujoco:
             yield
         finally:
             self._mujoco.set_mju_user_warning(before)
-
-
-def mujoco_version() -> str:
-    """The version of MuJoCo that is used. Raises `MachineError` as `PinnedMujoco` does."""
-    return str(_mujoco().__version__)
-
-
-def _mujoco() -> Any:
-    try:
-        mujoco = import_module("mujoco")
-    except ImportError:
-        raise MachineError("the package 'mujoco' is not installed", REMEDY) from None
-    oldest, barred = VERSIONS
-    if not oldest <= tuple(map(int, re.findall(r"\d+", mujoco.__version__)[:2])) < barred:
-        ours, theirs = (".".join(map(str, version)) for version in VERSIONS)
-        raise MachineError(
-            f"mujoco {mujoco.__version__} is installed, and only {ours} up to but not including "
-            f"{theirs} will do",
-            REMEDY,
-        )
-    return mujoco
 
 
 def _specification(mujoco: Any, tree: Linkage) -> Any:

@@ -16,6 +16,9 @@ from flexspine.mechanics.linkage import Foot, Joint, Link, Linkage
 from flexspine.models.model import Source
 from flexspine.parameters import ParameterSet, build, quantity, values
 
+# What is across the plane.
+SPACE = "space"
+
 
 class LinkNumbers(ParameterSet):
     """What a link measures."""
@@ -57,17 +60,41 @@ class GroundNumbers(ParameterSet):
     )
 
 
+class SpaceNumbers(ParameterSet):
+    """What a robot measures across its plane, and how the ground gives that it meets in space."""
+
+    hip_width: float = quantity("m", "from the left to the right hips", above=0, upper=1e3)
+    trunk_width: float = quantity("m", "of the trunk", above=0, upper=1e3)
+    trunk_height: float = quantity("m", "of the trunk", above=0, upper=1e3)
+    leg_width: float = quantity("m", "of thighs and shanks, which are square", above=0, upper=1e3)
+    foot_radius: float = quantity("m", "of the feet, which are spheres", above=0, upper=1e3)
+    yaw_stiffness: float = quantity(
+        "N m/rad", "of the trunk sideways; 0: it does not bend", at_least=0, upper=1e9, default=0.0
+    )
+    yaw_damping: float = quantity(
+        "N m s/rad", "of the trunk sideways", at_least=0, upper=1e9, default=0.0
+    )
+    ground_stiffness: float = quantity(
+        "N/m", "of the ground under a foot", above=0, upper=1e9, default=5e4
+    )
+    ground_damping: float = quantity(
+        "N s/m", "of the ground under a foot", at_least=0, upper=1e9, default=1e3
+    )
+
+
 @dataclass(frozen=True)
 class LegParts:
     """What makes a leg: its foot, its thigh and the part of the trunk that carries it.
 
     The shank is the link of the foot. ``knee_back``: the knee is behind the line from hip to foot.
+    ``side`` is ``left`` or ``right``, or nothing for a robot that stays in the plane.
     """
 
     foot: str
     thigh: str
     trunk: str
     knee_back: bool = True
+    side: str = ""
 
 
 @dataclass(frozen=True)
@@ -76,7 +103,8 @@ class Robot:
 
     ``parents`` by link, in the order of the coordinates; the first has none. ``joints`` by name:
     link and whether it has a motor. ``feet`` by name: link. ``numbers`` by dotted name, such as
-    ``spine.stiffness``, in SI units and radians. ``legs`` by name, for gaits.
+    ``spine.stiffness``, in SI units and radians; those under ``space.`` are across the plane.
+    ``legs`` by name, for gaits.
     """
 
     name: str
@@ -141,6 +169,8 @@ def checked(
     """All numbers by dotted name, defaults filled in. Raises `ParameterError`."""
     kinds: dict[str, type[ParameterSet]] = dict.fromkeys(parents, LinkNumbers)
     kinds |= dict.fromkeys(joints, JointNumbers) | dict.fromkeys(feet, FootNumbers)
+    if any(name.startswith(f"{SPACE}.") for name in numbers):
+        kinds[SPACE] = SpaceNumbers
     ground = {name: value for name, value in numbers.items() if "." not in name}
     found = values(build(GroundNumbers, ground))
     for part, kind in kinds.items():

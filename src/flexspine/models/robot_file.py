@@ -11,7 +11,7 @@ from typing import Any
 
 from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.model import Source
-from flexspine.models.robot import LegParts, Robot, checked
+from flexspine.models.robot import SPACE, LegParts, Robot, checked
 
 TABLES = ("links", "joints", "feet")
 LEGS = "legs"
@@ -67,13 +67,15 @@ def _parsed(text: str) -> dict[str, Any]:
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as failure:
         raise InputError(f"not valid TOML: {failure}", "mend that line") from None
-    known = (*TABLES, LEGS, *TEXTS, *LISTS, *GROUND)
+    known = (*TABLES, LEGS, SPACE, *TEXTS, *LISTS, *GROUND)
     for entry in content:
         if entry not in known:
             raise InputError(f"unknown entry '{entry}'", f"known: {', '.join(known)}")
     for entry in TEXTS:
         if not isinstance(content.get(entry, ""), str):
             raise InputError(f"'{entry}' is no text", "put it in quotes")
+    if not isinstance(content.get(SPACE, {}), Mapping):
+        raise InputError(f"'{SPACE}' is not a table", f"write [{SPACE}]")
     for entry in LISTS:
         texts = content.get(entry, [])
         if not (isinstance(texts, list) and all(isinstance(text, str) for text in texts)):
@@ -104,6 +106,7 @@ def _robot(name: str, content: Mapping[str, Any], origin: str) -> Robot:
     for leg, entries in legs.items():
         _check_leg(f"{LEGS}.{leg}", entries, links, feet)
     numbers = {entry: content[entry] for entry in GROUND if entry in content}
+    numbers |= {f"{SPACE}.{entry}": value for entry, value in content.get(SPACE, {}).items()}
     for table, parts in zip(TABLES, (links, joints, feet), strict=True):
         for part, entries in parts.items():
             numbers |= {f"{part}.{k}": v for k, v in entries.items() if k not in WORDS[table]}
@@ -146,6 +149,8 @@ def _check_names(*tables: Mapping[str, Any]) -> None:
             )
         if "." in name:
             raise InputError(f"'{name}' has a dot in its name", "use an underscore")
+        if name == SPACE:
+            raise InputError(f"a part is named '{SPACE}'", "name it otherwise")
 
 
 def _check_tree(parents: Mapping[str, Any]) -> None:
@@ -225,6 +230,11 @@ def _check_leg(
         raise InputError(
             f"{where}: knee_back = {entries['knee_back']!r} is neither true nor false",
             "write knee_back = true",
+        )
+    if entries.get("side", "") not in ("", "left", "right"):
+        raise InputError(
+            f"{where}: side = {entries['side']!r} is neither left nor right",
+            'write side = "left"',
         )
     shank, thigh, trunk = feet[entries["foot"]]["link"], entries["thigh"], entries["trunk"]
     if len({shank, thigh, trunk}) < 3:

@@ -1,0 +1,39 @@
+"""MuJoCo, if it is there and of a version that will do, and what it cannot be told."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from typing import Any
+
+from flexspine.errors import MachineError
+
+# Versions from the first up to the second: 4.0.0 gets accelerations wrong.
+VERSIONS = (3, 17), (4, 0)
+
+REMEDY = "pip install 'mujoco>=3.17,<4', or flexspine with the extra 'engine'"
+
+# kg m^2; MuJoCo takes no body without inertia, and this much is less than rounding errors.
+LEAST_INERTIA = 2e-15
+
+
+def mujoco_version() -> str:
+    """The version of MuJoCo that is used. Raises `MachineError` as `mujoco_module` does."""
+    return str(mujoco_module().__version__)
+
+
+def mujoco_module() -> Any:
+    """MuJoCo. Raises `MachineError` if it is missing or has a version that is not supported."""
+    try:
+        mujoco = import_module("mujoco")
+    except ImportError:
+        raise MachineError("the package 'mujoco' is not installed", REMEDY) from None
+    oldest, barred = VERSIONS
+    if not oldest <= tuple(map(int, re.findall(r"\d+", mujoco.__version__)[:2])) < barred:
+        ours, theirs = (".".join(map(str, version)) for version in VERSIONS)
+        raise MachineError(
+            f"mujoco {mujoco.__version__} is installed, and only {ours} up to but not including "
+            f"{theirs} will do",
+            REMEDY,
+        )
+    return mujoco
