@@ -26,6 +26,7 @@ from flexspine.cli import (
     optimise,
     presets,
     robustness,
+    run3d,
     study,
     sweep,
     terrain,
@@ -70,6 +71,7 @@ app.command("robustness")(robustness.robustness)
 app.command("limits")(limits.limits)
 app.command("optimise")(optimise.optimise)
 app.command("trot")(trot.trot)
+app.command("run3d")(run3d.run3d)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)

@@ -38,19 +38,19 @@ def sweep(
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> int:
-    """Simulate, or find gaits, at every point of a grid or a sample, and keep what comes of it.
+    """Simulate, find gaits or let robots walk at points of a grid or sample, and keep the rows.
 
-    The file names models and axes, a task (runs, searches, gaits) and its options. Rows land in
-    Parquet files in DIR/rows, a chunk at a time. Interrupted or killed, the same command goes on.
-    Exit code 0: done; 1: searches or gaits of which none was found; 2: bad input; 3: the machine or
-    its workers failed; 130: interrupted.
+    The file names models and axes, a task (runs, searches, gaits, walks) and its options. Rows land
+    in Parquet files in DIR/rows, a chunk at a time. Interrupted or killed, the same command goes
+    on. Exit code 0: done; 1: searches or gaits of which none was found; 2: bad input; 3: the
+    machine or its workers failed; 130: interrupted.
 
     Examples:
         flexspine sweep examples/million_strides.toml --out results/million
 
         flexspine sweep FILE.toml --out DIR --scheduler tcp://node1:8786
     """
-    from flexspine.studies.plan import RUNS
+    from flexspine.studies.plan import RUNS, WALKS
     from flexspine.studies.sweep import sweep as carry_out
     from flexspine.studies.tasks import FOUND
 
@@ -58,7 +58,7 @@ def sweep(
         done = carry_out(
             plan, out, processes=count_of(processes), client=scheduler, progress=progress
         )
-    code = 0 if done.plan.task == RUNS or done.outcomes.get(FOUND) else 1
+    code = 0 if done.plan.task in (RUNS, WALKS) or done.outcomes.get(FOUND) else 1
     if json:
         print_json(_record(done))
         return code

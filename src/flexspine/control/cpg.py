@@ -10,7 +10,7 @@ cosine, without a jump in its velocity.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi
 
@@ -30,7 +30,8 @@ class Rhythm:
     ``offsets`` by leg are the shares of a cycle by which it is behind, ``duty`` the share of its
     cycle that a leg stands. A foot goes ``stride`` back under its hip, at ``height`` below it, and
     is lifted by ``clearance``. ``coupling`` (1/s) is how fast phases get into step, ``readiness``
-    (1/s) how fast the amplitude follows. The rhythm stops at ``stop`` (s).
+    (1/s) how fast the amplitude follows. The rhythm stops at ``stop`` (s). ``ahead`` by leg is how
+    far ahead of its hip the middle of a foot's way is, if it is not below it.
     """
 
     offsets: Mapping[str, float]
@@ -42,6 +43,7 @@ class Rhythm:
     coupling: float = 5.0
     readiness: float = 6.0
     stop: float = inf
+    ahead: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -137,8 +139,9 @@ class Cpg:
         lift = (1 - np.cos(2 * pi * swing)) / 2
         lift_rate = np.where(back, 0.0, pi * np.sin(2 * pi * swing) / (1 - duty)) * speed
         size, growth = beat.amplitude, beat.amplitude_rate
+        middle = np.array([cycle.ahead.get(leg, 0.0) for leg in cycle.offsets])
         place = np.stack(
-            [cycle.stride * size * x, cycle.clearance * size * lift - cycle.height], axis=1
+            [middle + cycle.stride * size * x, cycle.clearance * size * lift - cycle.height], axis=1
         )
         velocity = np.stack(
             [

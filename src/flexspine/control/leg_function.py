@@ -42,6 +42,11 @@ class LegFunction:
         table, _ = self._function(self._known(place, velocity))
         return table[0], table[1]
 
+    def links(self, place: Array, velocity: Array) -> dict[str, tuple[float, float]]:
+        """Angle from +x and rate of every link of the legs."""
+        _, links = self._function(self._known(place, velocity))
+        return {link: (float(angle), float(rate)) for link, (angle, rate, _) in links.items()}
+
     def posture(self, place: Array) -> Array:
         """``q`` of the robot that stands on these places, the lowest of them on the ground."""
         linkage = self._robot.linkage

@@ -121,7 +121,7 @@ def _draw_scene(mujoco: Any, spec: Any, ground: bool) -> None:
     world = spec.worldbody
     world.add_light(
         pos=[0, 0, 4], dir=[0.2, 0.3, -1], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        castshadow=True, diffuse=[0.6, 0.6, 0.6],
+        castshadow=False, diffuse=[0.6, 0.6, 0.6],
     )  # fmt: skip
     spec.visual.headlight.ambient = [0.45, 0.45, 0.45]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
@@ -190,7 +190,7 @@ def _add_body(mujoco: Any, parent: Any, space: SpaceRobot, part: Part, start: St
     )
     if free:
         body.add_camera(
-            name="side", mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, pos=[0.3, -2.0, 0.35],
+            name="side", mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, pos=[0.3, -1.5, 0.3],
             xyaxes=[1, 0, 0, 0, 0.2, 1],
         )  # fmt: skip
     return body

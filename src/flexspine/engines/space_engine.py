@@ -9,6 +9,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexspine.engines.contact import ContactLaw
 from flexspine.engines.installed import mujoco_module
@@ -42,7 +43,8 @@ class SpaceEngine:
         self._feet = [self.model.geom(ball.foot).id for ball in space.balls]
         self._radius = np.array([ball.radius for ball in space.balls])
         self._lengths = np.array([part.length for part in space.parts])
-        self._foot_of = {geom: number for number, geom in enumerate(self._feet)}
+        self._foot_of = np.zeros(self.model.ngeom, dtype=np.int64)
+        self._foot_of[self._feet] = np.arange(len(self._feet))
 
     @property
     def step(self) -> float:
@@ -108,25 +110,26 @@ class SpaceEngine:
     def forces(self) -> Array:
         """Ground reaction forces on the feet in N, shape (feet, 3), along x, y and z."""
         found = np.zeros((len(self._feet), 3))
-        contacts, efc = self.data.contact, self.data.efc_force
-        for number in range(self.data.ncon):
-            row = int(contacts.efc_address[number])
-            if row >= 0:
-                frame = contacts.frame[number].reshape(3, 3)
-                found[self._foot_of[int(contacts.geom[number, 1])]] += efc[row : row + 3] @ frame
+        touching, rows = self._contacts()
+        # Along the normal, which is z, and two ways across it; the frame is the same for all feet.
+        if len(touching):
+            found[touching] = rows @ self.data.contact.frame[0].reshape(3, 3)
         return found
 
     @property
     def normals(self) -> Array:
         """Normal forces on the feet in N, shape (feet,)."""
         found = np.zeros(len(self._feet))
-        contacts = self.data.contact
-        for number in range(self.data.ncon):
-            row = int(contacts.efc_address[number])
-            if row >= 0:
-                foot = self._foot_of[int(contacts.geom[number, 1])]
-                found[foot] += self.data.efc_force[row]
+        touching, rows = self._contacts()
+        found[touching] = rows[:, 0]
         return found
+
+    def _contacts(self) -> tuple[NDArray[np.int64], Array]:
+        """Which feet touch the ground, and the forces on them, shape (k, 3)."""
+        contact = self.data.contact
+        # Contacts are all that constrains the robot: three rows each, in order.
+        borne = contact.geom[contact.efc_address >= 0, 1]
+        return self._foot_of[borne], self.data.efc_force.reshape(-1, 3)
 
     def look(self) -> dict[str, Any]:
         """Where everything is, in the frame of the world."""
@@ -136,6 +139,7 @@ class SpaceEngine:
         self._mujoco.mj_subtreeVel(self.model, data)
         root = self._links[0]
         return {
+            "qpos": data.qpos.copy(),
             "com": data.subtree_com[root].copy(),
             "com_rate": data.subtree_linvel[root].copy(),
             "turn": data.xmat[self._links[: len(self.space.trunk)]].reshape(-1, 3, 3).copy(),

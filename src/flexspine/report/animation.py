@@ -18,6 +18,7 @@ from flexspine.errors import InputError, MachineError, OutputError, ParameterErr
 from flexspine.report.caption import ending, heading
 from flexspine.report.postures import Posture, postures
 from flexspine.report.robot_scene import RobotScene
+from flexspine.report.sagittal import is_spatial, sagittal
 from flexspine.report.scene import Scene, pill, view_of
 from flexspine.report.stage import DOTS, View, add_force_key, draw_ground, draw_heights, write
 from flexspine.report.stick_figure import Scale, StickFigure, bend_palette
@@ -69,13 +70,14 @@ def animate(
 ) -> None:
     """Write a run as an animated stick figure, ``slow_down`` times slower than real.
 
-    If it is not given, bounders are slowed down eight times and robots not at all. The suffix of
-    ``path``, .gif or .mp4, gives the format. Of a run that needs more than 600 frames the last 600
-    are shown. ``progress`` is told the share that is done, 0 to 1. Raises `InputError`, among them
-    `OutputError` for a path that cannot be written to, and `MachineError` where the video encoder
-    fails.
+    If it is not given, bounders are slowed down eight times and robots not at all. A run in space
+    is shown from the right. The suffix of ``path``, .gif or .mp4, gives the format. Of a run that
+    needs more than 600 frames the last 600 are shown. ``progress`` is told the share that is done,
+    0 to 1. Raises `InputError`, among them `OutputError` for a path that cannot be written to, and
+    `MachineError` where the video encoder fails.
     """
     robot = is_robot(dataset)
+    dataset = sagittal(dataset) if is_spatial(dataset) else dataset
     check_samples(dataset, robot=robot)
     path = Path(path)
     if path.suffix.lower() not in (".gif", ".mp4"):

@@ -70,6 +70,13 @@ def _of_task(dataset: xr.Dataset) -> list[str]:
         parts.append(f"controller: {name}{rate}")
     if "gait.speed" in asked:
         parts.append(f"desired speed {asked['gait.speed']:g} m/s")
+    gains = json.loads(dataset.attrs.get("gains", "{}"))
+    if gains:
+        parts.append(f"desired speed {gains['gait.speed']:g} m/s")
+        parts.append(f"strides at {gains['gait.frequency']:g} Hz")
+    if "contact" in dataset.attrs:
+        law = next(iter(json.loads(dataset.attrs["contact"]).values()))
+        parts.append(f"ground {law['stiffness']:g} N/m, {law['damping']:g} N s/m")
     if asked.get("push"):
         parts.append(f"push {asked['push']:g} N s")
     return parts

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from flexspine.errors import ParameterError
 from flexspine.report.caption import WIDE, describe, ending, heading, joined
 from flexspine.report.robot_parts import RobotLeg, RobotParts, typical_force
+from flexspine.report.sagittal import is_spatial, sagittal
 from flexspine.report.style import (
     FAINT,
     GREEN,
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-CYCLES = 4  # step cycles that are shown of a long run
+CYCLES = 4  # strides that are shown of a long run
 
 LEAST_IMPULSE = 1e-9  # N s; what is less comes from rounding
 LEAST_SHARE = 0.01  # of the largest impulse; what is less looks like none
@@ -50,37 +52,44 @@ _STEM: dict[str, Any] = {"linewidth": 0.7, "markersize": 3.2, "markeredgewidth":
 
 
 def plot_robot(dataset: xr.Dataset, *, window: tuple[float, float] | None = None) -> Figure:
-    """Draw a robot's run: stances, joints, ground reaction forces, CoM, pitch and spine.
+    """Draw a robot's run: stances, joints, ground reaction forces, CoM, trunk and spine.
 
-    ``window`` (s) is the part that is drawn; if not given, the last four step cycles, or all of a
-    shorter run. Joints and forces are those of the first rear and the first front leg. Raises
-    `InputError` for a dataset without samples and `ParameterError` for a window without any.
+    ``window`` (s) is the part that is drawn; if not given, the last four strides, or all of a
+    shorter run. Joints and forces are those of the first rear and the first front leg. Of a run in
+    space all three coordinates of the CoM are drawn. Raises `InputError` for a dataset without
+    samples and `ParameterError` for a window without any.
     """
-    check_samples(dataset, robot=True)
+    spatial = is_spatial(dataset)
+    check_samples(sagittal(dataset) if spatial else dataset, robot=True)
     whole = drawable(dataset)
     limits = _limits(whole, window)
     time = whole["time"].values
     shown = whole.isel(time=(time >= limits[0]) & (time <= limits[1]))
-    parts = RobotParts.of(whole)
+    flat = sagittal(shown) if spatial else shown
+    parts = RobotParts.of(sagittal(whole) if spatial else whole)
     legs = [leg for leg in (parts.first("hind"), parts.first("fore")) if leg is not None]
     joints = [(leg, joint) for leg in legs for joint in leg.joints]
+    com = [0.62] * 3 if spatial else [0.9]
     with themed({"lines.linewidth": 1.2}):
         details = joined([*describe(whole), _part(whole, limits)], WIDE)
         early = ending(dataset)
-        heights = [0.2 * len(parts.legs), *[0.62] * len(joints), 1.05, 1.05, 0.9, 0.9]
+        heights = [0.2 * len(parts.legs), *[0.62] * len(joints), 1.05, 1.05, *com, 0.9]
         size = (8.4, sum(heights) + 0.12 * len(heights) + 1.0 + LINE * len(details))
         figure = Figure(figsize=size, layout="constrained")
         bars, *rest = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
-        *angles, normal, tangential, com, trunk = rest
-        _draw_stances(bars, shown, parts)
+        angles, (normal, tangential, *places, trunk) = rest[: len(joints)], rest[len(joints) :]
+        _draw_stances(bars, flat, parts)
         for axes, (leg, joint) in zip(angles, joints, strict=True):
-            _draw_joint(axes, shown, leg, joint)
+            _draw_joint(axes, flat, leg, joint)
             if joint == leg.joints[0]:
                 add_legend(axes)
-        _draw_forces(normal, shown, legs, "y")
-        _draw_forces(tangential, shown, legs, "x")
-        _draw_com(com, shown)
-        _draw_trunk(trunk, shown, parts)
+        _draw_forces(normal, flat, legs, "y")
+        _draw_forces(tangential, flat, legs, "x")
+        if spatial:
+            _draw_places(places, shown)
+        else:
+            _draw_com(places[0], shown)
+        _draw_angles(trunk, shown, parts)
         trunk.set_xlim(*limits)
         trunk.set_xlabel("time (s)")
         figure.align_ylabels(rest)
@@ -99,10 +108,19 @@ def _limits(dataset: xr.Dataset, window: tuple[float, float] | None) -> tuple[fl
                 f"give times between {first:g} s and {last:g} s, the earlier first",
             )
         return window[0], max(window[1], window[0] + 1e-6)
-    stance = json.loads(dataset.attrs.get("settings", "{}")).get("gait.stance")
-    # Each pair of legs stands once in a cycle.
-    start = max(first, last - CYCLES * 2 * stance) if stance else first
+    cycle = _cycle(dataset)
+    start = max(first, last - CYCLES * cycle) if cycle else first
     return start, max(last, start + 1e-6)
+
+
+def _cycle(dataset: xr.Dataset) -> float | None:
+    """How long a stride takes, in s."""
+    frequency = json.loads(dataset.attrs.get("gains", "{}")).get("gait.frequency")
+    if frequency:
+        return float(1 / frequency)
+    stance = json.loads(dataset.attrs.get("settings", "{}")).get("gait.stance")
+    # Each pair of legs stands once in a stride.
+    return 2 * stance if stance else None
 
 
 def _part(dataset: xr.Dataset, limits: tuple[float, float]) -> str:
@@ -147,7 +165,8 @@ def _draw_joint(axes: Axes, dataset: xr.Dataset, leg: RobotLeg, joint: str) -> N
     if "reference" in dataset:
         wanted = np.degrees(dataset["reference"].sel(motor=joint).values)
         axes.plot(time, wanted, color=INK, linestyle="--", linewidth=0.9, label="desired")
-    axes.set_ylabel(f"{leg.title}\n{joint.replace('_', ' ')} (°)")
+    name = joint.removeprefix(f"{leg.name}_").replace("_", " ")
+    axes.set_ylabel(f"{leg.title}\n{name} (°)")
     _few_ticks(axes)
     widen(axes, 1.0)
 
@@ -175,10 +194,11 @@ def _draw_forces(axes: Axes, dataset: xr.Dataset, legs: list[RobotLeg], axis: st
     axes.set_ylabel(f"{'normal' if axis == 'y' else 'tangential'}\nGRF (N)")
     _few_ticks(axes)
     handles, labels = axes.get_legend_handles_labels()
-    if _draw_impulses(axes, dataset, legs, axis):
+    scaled = _draw_impulses(axes, dataset, legs, axis)
+    if scaled:
         handles.append(Line2D([], [], color=FAINT, marker="o", markerfacecolor="white", **_STEM))
         labels.append("impulse at\nimpact")
-    add_legend(axes, handles, labels, aside=SCALE_ROOM)
+    add_legend(axes, handles, labels, aside=SCALE_ROOM if scaled else 0.0)
 
 
 def _draw_impulses(axes: Axes, dataset: xr.Dataset, legs: list[RobotLeg], axis: str) -> bool:
@@ -225,6 +245,16 @@ def _draw_com(axes: Axes, dataset: xr.Dataset) -> None:
     add_legend(axes, [height, ahead], ["height", "ahead of\nsteady motion"], aside=SCALE_ROOM)
 
 
+def _draw_places(panels: Sequence[Axes], dataset: xr.Dataset) -> None:
+    """The CoM in space, a panel each way."""
+    time = dataset["time"].values
+    for axes, name, place in zip(panels, "xyz", dataset["com"].values.T, strict=True):
+        axes.plot(time, place, color=INK)
+        axes.set_ylabel(f"CoM\n{name} (m)")
+        widen(axes, 0.01)
+        _few_ticks(axes)
+
+
 def steady(time: Array, x: Array) -> Array:
     """Return the straight line over time (s) that is nearest to ``x``."""
     if len(time) < 2:
@@ -233,10 +263,13 @@ def steady(time: Array, x: Array) -> Array:
     return line
 
 
-def _draw_trunk(axes: Axes, dataset: xr.Dataset, parts: RobotParts) -> None:
+def _draw_angles(axes: Axes, dataset: xr.Dataset, parts: RobotParts) -> None:
+    """How the trunk is turned, and by how much its spine is bent."""
     time = dataset["time"].values
-    if "trunk_pitch" in dataset:
-        axes.plot(time, np.degrees(dataset["trunk_pitch"].values), color=INK, label="trunk pitch")
+    for name, style in (("pitch", "-"), ("roll", "--"), ("yaw", ":")):
+        if f"trunk_{name}" in dataset:
+            turned = np.degrees(dataset[f"trunk_{name}"].values)
+            axes.plot(time, turned, color=INK, linestyle=style, label=f"trunk {name}")
     if parts.spine is not None:
         angle = np.degrees(dataset["angle"].sel(joint=parts.spine).values)
         axes.plot(time, angle, color=PURPLE, label=f"{parts.spine.replace('_', ' ')} angle")

@@ -65,6 +65,8 @@ class RobotParts:
             json.loads(dataset.attrs.get(name, "{}")) for name in ("parents", "joints", "legs")
         )
         feet = feet or {str(name): str(name) for name in dataset["foot_name"].values}
+        if "limbs" in dataset.attrs:
+            return cls._in_space(dataset, parents, joints, feet)
         tree = _Tree(parents, joints, {leg: _carrier(dataset, feet[leg]) for leg in feet})
         links = {leg: tree.leg(leg) for leg in feet}
         of_legs = {link for each in links.values() for link in each}
@@ -75,9 +77,42 @@ class RobotParts:
             near = all(other.side != sides[leg] for other in legs)
             own = tuple(j for j in tree.upper_joints(links[leg], trunk) if j in motors)
             legs.append(RobotLeg(leg, foot, links[leg], own, sides[leg], near))
+        return cls._of_legs(dataset, legs, trunk, parents, joints)
+
+    @classmethod
+    def _in_space(
+        cls,
+        dataset: xr.Dataset,
+        parents: Mapping[str, str | None],
+        joints: Mapping[str, str],
+        feet: Mapping[str, str],
+    ) -> RobotParts:
+        """A robot in space, seen from the right; it says itself what its legs are made of."""
+        limbs, sides = json.loads(dataset.attrs["limbs"]), _sides(dataset, feet)
+        legs = [
+            RobotLeg(
+                name, feet[name], tuple(limb["links"]), tuple(limb["joints"]), sides[name],
+                limb["side"] == "right",
+            )
+            for name, limb in limbs.items()
+        ]  # fmt: skip
+        of_legs = {link for leg in legs for link in leg.links}
+        trunk = tuple(link for link in parents if link not in of_legs)
+        return cls._of_legs(dataset, legs, trunk, parents, joints)
+
+    @classmethod
+    def _of_legs(
+        cls,
+        dataset: xr.Dataset,
+        legs: list[RobotLeg],
+        trunk: tuple[str, ...],
+        parents: Mapping[str, str | None],
+        joints: Mapping[str, str],
+    ) -> RobotParts:
         spine = next((j for j in joints if {joints[j], parents[joints[j]]} <= {*trunk}), None)
         turned = None if spine is None else joints[spine]
-        return cls(tuple(legs), trunk, spine, turned, _way(dataset, tree, turned))
+        above = None if turned is None else parents[turned]
+        return cls(tuple(legs), trunk, spine, turned, _way(dataset, above, turned))
 
     def first(self, side: str) -> RobotLeg | None:
         """Return the first leg of a side."""
@@ -147,11 +182,11 @@ def _sides(dataset: xr.Dataset, feet: Mapping[str, str]) -> dict[str, str]:
     return {name: "fore" if place >= middle else "hind" for name, place in x.items()}
 
 
-def _way(dataset: xr.Dataset, tree: _Tree, link: str | None) -> float:
-    if link is None:
+def _way(dataset: xr.Dataset, parent: str | None, link: str | None) -> float:
+    if link is None or parent is None:
         return 1.0
     x = _middles(dataset)
-    return 1.0 if x[link] >= x[str(tree.parents[link])] else -1.0
+    return 1.0 if x[link] >= x[parent] else -1.0
 
 
 def _middles(dataset: xr.Dataset) -> dict[str, float]:

@@ -16,6 +16,7 @@ from flexspine.models.many import make_cases, start_energies
 from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.parameters import is_finite, shortened
+from flexspine.studies.walkers import Walker
 
 # What is known of a gait only.
 OF_GAITS = ("energy", "mean_speed")
@@ -103,7 +104,7 @@ class Axis:
         assert room is not None
         return own - room, own + room
 
-    def own(self, model: Model) -> float:
+    def own(self, model: Model | Walker) -> float:
         """The value of a model that the axis is about, if it is about one."""
         about = self.around is not None or self.within is not None
         return own_value(model, self.name) if about else float("nan")
@@ -126,12 +127,12 @@ class Axis:
         return low + (high - low) * share
 
 
-def own_value(model: Model, name: str) -> float:
+def own_value(model: Model | Walker, name: str) -> float:
     """A model's own value of what an axis varies; NaN if it has no such thing.
 
     Raises `ParameterError` for the mean speed or the energy of a model that starts on no gait.
     """
-    if name not in OF_GAITS:
+    if name not in OF_GAITS or isinstance(model, Walker):
         return {**model.numbers}.get(name, float("nan"))
     gait = examine(model)
     if gait.flaw is not None:
@@ -142,7 +143,9 @@ def own_value(model: Model, name: str) -> float:
     return gait.quantities[name]
 
 
-def grid_points(model: Model, axes: tuple[Axis, ...], first: int, count: int) -> dict[str, Array]:
+def grid_points(
+    model: Model | Walker, axes: tuple[Axis, ...], first: int, count: int
+) -> dict[str, Array]:
     """Points of a grid by number; the last axis changes fastest."""
     free = free_axes(axes)
     lines = [axis.grid(axis.own(model)) for axis in free]
@@ -152,7 +155,12 @@ def grid_points(model: Model, axes: tuple[Axis, ...], first: int, count: int) ->
 
 
 def sampled_points(
-    model: Model, axes: tuple[Axis, ...], method: str, seed: tuple[int, ...], first: int, count: int
+    model: Model | Walker,
+    axes: tuple[Axis, ...],
+    method: str,
+    seed: tuple[int, ...],
+    first: int,
+    count: int,
 ) -> dict[str, Array]:
     """Points of a sample by number; they do not depend on which others are asked for."""
     free = free_axes(axes)
@@ -177,9 +185,13 @@ def free_axes(axes: tuple[Axis, ...]) -> tuple[Axis, ...]:
     return tuple(axis for axis in axes if not axis.keeps)
 
 
-def _completed(model: Model, axes: tuple[Axis, ...], points: dict[str, Array]) -> dict[str, Array]:
+def _completed(
+    model: Model | Walker, axes: tuple[Axis, ...], points: dict[str, Array]
+) -> dict[str, Array]:
     """Add what follows from other axes, and keep the order."""
-    made = {axis.name: _speeds(model, points) for axis in axes if axis.keeps}
+    made = {}
+    if isinstance(model, Model):
+        made = {axis.name: _speeds(model, points) for axis in axes if axis.keeps}
     return {axis.name: {**points, **made}[axis.name] for axis in axes}
 
 

@@ -166,7 +166,7 @@ def basin_plan(
         chunk=CHUNK,
         options={"strides": strides, "tolerance": min(g.tolerance for g in gaits.values())},
     )
-    for model in plan.models:
+    for model in plan.bounders:
         if not grid_points(model, plan.axes, 0, plan.points).get("speed", np.ones(1)).any():
             raise ParameterError(
                 f"about '{model.name}' every start has more energy than the gait, even at rest",
@@ -217,7 +217,7 @@ def read_basins(path: str | Path) -> list[Basin]:
 
 def _basin(store: Store, number: int) -> Basin:
     plan = store.plan
-    model, (first, second) = plan.models[number], free_axes(plan.axes)
+    model, (first, second) = plan.bounders[number], free_axes(plan.axes)
     gait = examine(model, tolerance=plan.tolerance)
     kept = len(plan.axes) > len((first, second))
     ends = [f"apex_{name}" for name in model.apex]

@@ -155,9 +155,9 @@ def read_map(path: str | Path) -> GaitMap:
     room = AT_BOUND * speeds[-1]
     why = table["reason"].reshape(shape)
     return GaitMap(
-        model=plan.models[0],
-        energy=examine(plan.models[0], tolerance=plan.tolerance).energy,
-        height=plan.models[0].apex["height"],
+        model=plan.bounders[0],
+        energy=examine(plan.bounders[0], tolerance=plan.tolerance).energy,
+        height=plan.bounders[0].apex["height"],
         stiffnesses=stiffnesses,
         speeds=speeds,
         peak_grf=peak.reshape(shape),

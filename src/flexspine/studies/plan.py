@@ -30,13 +30,17 @@ from flexspine.studies.axes import (
     grid_size,
     sampled_points,
 )
+from flexspine.studies.walkers import Walker
 
-RUNS, SEARCHES, GAITS = "runs", "searches", "gaits"
-TASKS = (RUNS, SEARCHES, GAITS)
+RUNS, SEARCHES, GAITS, WALKS = "runs", "searches", "gaits", "walks"
+TASKS = (RUNS, SEARCHES, GAITS, WALKS)
 
 # What one piece of work and one file hold: some seconds of it.
 MOST_STRIDES, MOST_RUNS, FEWEST_RUNS = 400_000, 16384, 256
-SEARCHES_EACH = 16
+SEARCHES_EACH, WALKS_EACH = 16, 4
+
+# s; how long a walk is, if it is not told.
+WALK_SECONDS = 10.0
 
 WORDS = {bool: "true or false", dict: "a table", str: "the name of an axis"}
 
@@ -50,20 +54,22 @@ OPTIONS: dict[str, dict[str, type]] = {
     RUNS: {"strides": int},
     SEARCHES: {"starts": int, "symmetric": bool, "fixed": dict},
     GAITS: {"over": str, "symmetric": bool},
+    WALKS: {"seconds": float, "sensing": float},
 }
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep: a ``task`` at points of ``axes``, for each of ``models``.
+    """A sweep: a ``task`` at points of ``axes``, for each of ``models``, walkers if they walk.
 
     ``method`` is ``grid``, ``random`` or ``sobol``; the latter two draw ``samples`` points a model
     from ``seed``. ``chunk`` points make a piece of work and a file. ``options`` are the task's:
     ``strides`` of runs; ``starts``, ``symmetric`` and ``fixed`` of searches; the axis ``over``
-    which gaits are followed, and ``symmetric``; ``tolerance`` of all.
+    which gaits are followed, and ``symmetric``; ``tolerance`` of all these; ``seconds`` and
+    ``sensing`` of walks.
     """
 
-    models: tuple[Model, ...]
+    models: tuple[Model | Walker, ...]
     axes: tuple[Axis, ...]
     task: str = RUNS
     method: str = GRID
@@ -88,8 +94,8 @@ class Plan:
             return len(axis.values) or axis.steps or 1
         if self.chunk is not None:
             return self.chunk
-        if self.task == SEARCHES:
-            return SEARCHES_EACH
+        if self.task in (SEARCHES, WALKS):
+            return SEARCHES_EACH if self.task == SEARCHES else WALKS_EACH
         runs = MOST_STRIDES // int(self.options.get("strides", 1))
         return min(max(runs, FEWEST_RUNS), MOST_RUNS)
 
@@ -116,7 +122,17 @@ class Plan:
         """The integrator's."""
         return float(self.options.get("tolerance", DEFAULT_TOLERANCE))
 
-    def of_chunk(self, chunk: int) -> tuple[Model, int, int]:
+    @property
+    def bounders(self) -> tuple[Model, ...]:
+        """The models of a sweep in which nobody walks."""
+        return tuple(model for model in self.models if isinstance(model, Model))
+
+    @property
+    def walkers(self) -> tuple[Walker, ...]:
+        """The models of a sweep of walks."""
+        return tuple(model for model in self.models if isinstance(model, Walker))
+
+    def of_chunk(self, chunk: int) -> tuple[Model | Walker, int, int]:
         """A chunk's model, its first point among that model's and how many points it has."""
         number, part = divmod(chunk, self.chunks_each)
         first = part * self.chunk_points
@@ -137,13 +153,23 @@ class Plan:
             "method": self.method,
             "samples": self.samples,
             "seed": self.seed,
-            "options": {**self.options, "tolerance": self.tolerance},
+            "options": self._options,
             "axes": {axis.name: axis.record() for axis in self.axes},
-            "models": [model_record(model) for model in self.models],
+            "models": [
+                model.record() if isinstance(model, Walker) else model_record(model)
+                for model in self.models
+            ],
             "chunk": self.chunk_points,
         }
         # NumPy's numbers become plain ones.
         return dict(json.loads(json.dumps(record, default=lambda number: number.item())))
+
+    @property
+    def _options(self) -> dict[str, Any]:
+        """The options with those that were not told."""
+        if self.task == WALKS:
+            return {"seconds": WALK_SECONDS, "sensing": 0.0, **self.options}
+        return {**self.options, "tolerance": self.tolerance}
 
     @classmethod
     def revive(cls, record: Mapping[str, Any]) -> Plan:
@@ -180,7 +206,15 @@ def _check(plan: Plan) -> None:
     if not plan.models:
         raise InputError("there is no model", "give one or more")
     for model in plan.models:
-        model.on_flat_ground("a sweep")
+        if (plan.task == WALKS) != isinstance(model, Walker):
+            raise InputError(
+                f"'{model.name}' is not for a sweep of {plan.task}",
+                f"give task = '{WALKS}' and a robot together",
+            )
+        if isinstance(model, Model):
+            model.on_flat_ground("a sweep")
+        else:
+            model.check()
     _check_once("model", [model.name for model in plan.models])
     _check_once("axis", [axis.name for axis in plan.axes])
     if not (type(plan.seed) is int and 0 <= plan.seed < SEEDS):
@@ -223,7 +257,9 @@ def _check_once(what: str, names: list[str]) -> None:
 
 
 def _check_options(plan: Plan) -> None:
-    known = {**OPTIONS[plan.task], "tolerance": float}
+    known = dict(OPTIONS[plan.task])
+    if plan.task != WALKS:
+        known["tolerance"] = float
     for name, value in plan.options.items():
         if name not in known:
             raise UnknownNameError(f"option of {plan.task}", name, known)
@@ -232,7 +268,7 @@ def _check_options(plan: Plan) -> None:
                 f"{name} = {shortened(value)} is not usable", f"give {WORDS[known[name]]}"
             )
     check_between("tolerance", plan.options.get("tolerance", DEFAULT_TOLERANCE), *TOLERANCES)
-    fixable = {*OF_GAITS, *ANGLES, *(name for model in plan.models for name in model.apex)}
+    fixable = {*OF_GAITS, *ANGLES, *(name for model in plan.bounders for name in model.apex)}
     for name, value in plan.options.get("fixed", {}).items():
         if name not in fixable:
             raise UnknownNameError("quantity to fix", name, fixable)
@@ -240,6 +276,10 @@ def _check_options(plan: Plan) -> None:
             raise InputError(f"{name} is both fixed and an axis", "keep one of them")
         if not is_finite(value):
             raise ParameterError(f"fixed {name} = {shortened(value)} is no number", "give a number")
+    if plan.task == WALKS:
+        check_between("seconds", plan.options.get("seconds", WALK_SECONDS), 0.01, 3600)
+        if plan.options.get("sensing", 0.0) != 0.0:
+            check_between("sensing", plan.options["sensing"], 0, 1)
     for name in ("strides", "starts"):
         if name in plan.options:
             check_count(name, plan.options[name])
@@ -258,9 +298,9 @@ def _check_options(plan: Plan) -> None:
                 )
 
 
-def _check_axes(plan: Plan, model: Model) -> None:
+def _check_axes(plan: Plan, model: Model | Walker) -> None:
     """Try the ends of every axis."""
-    quantities = set(OF_GAITS) if plan.task != RUNS else set()
+    quantities = set(OF_GAITS) if plan.task in (SEARCHES, GAITS) else set()
     anywhere = {name for each in plan.models for name in each.numbers}
     for axis in plan.axes:
         if axis.around is not None and model.numbers.get(axis.name) == 0:
@@ -268,7 +308,7 @@ def _check_axes(plan: Plan, model: Model) -> None:
                 f"axis '{axis.name}' is around 0 with '{model.name}', where a share is nothing",
                 "give {within = AMOUNT}",
             )
-        if axis.name in quantities:
+        if axis.name in quantities and isinstance(model, Model):
             axis.own(model)
             continue
         if axis.name not in model.numbers:
@@ -278,7 +318,12 @@ def _check_axes(plan: Plan, model: Model) -> None:
             if members:
                 raise InputError(f"axis '{axis.name}' is a group", f"write {sorted(members)[0]}")
             raise UnknownNameError("axis", axis.name, anywhere | quantities)
-        make_cases(model, {axis.name: np.array(axis.range(model.numbers[axis.name]))})
+        ends = axis.range(model.numbers[axis.name])
+        if isinstance(model, Walker):
+            for end in ends:
+                model.with_values({axis.name: end})
+        else:
+            make_cases(model, {axis.name: np.array(ends)})
 
 
 def model_record(model: Model) -> dict[str, Any]:
@@ -292,7 +337,9 @@ def model_record(model: Model) -> dict[str, Any]:
     }
 
 
-def _revived(record: Mapping[str, Any]) -> Model:
+def _revived(record: Mapping[str, Any]) -> Model | Walker:
+    if "walk" in record:
+        return Walker.revive(record)
     kind = find_kind(record["model"])
     try:
         parameters = build(kind.parameters, record["parameters"])

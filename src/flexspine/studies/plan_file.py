@@ -7,15 +7,23 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from flexspine.control.gains import load_walk
 from flexspine.errors import InputError, ParameterError, UnknownNameError
 from flexspine.gaits.files import load_gait
 from flexspine.models.model import Model
 from flexspine.models.presets import load_model
+from flexspine.models.robot_file import load_robot
 from flexspine.parameters import flattened, is_finite, shortened
 from flexspine.studies.axes import Axis
-from flexspine.studies.plan import Plan
+from flexspine.studies.plan import WALKS, Plan
+from flexspine.studies.walkers import Walker
 
-ENTRIES = {"model", "task", "method", "samples", "seed", "chunk", "options", "axes", "set"}
+ENTRIES = {
+    "model", "robot", "gait", "spine", "task", "method", "samples", "seed", "chunk", "options",
+    "axes", "set",
+}  # fmt: skip
+
+FLEXIBLE, LOCKED = "flexible", "locked"
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -47,23 +55,62 @@ def _plan(content: Mapping[str, Any], place: Path) -> Plan:
     for entry in content:
         if entry not in ENTRIES:
             raise UnknownNameError("entry", entry, ENTRIES)
-    for entry in ("model", "axes"):
+    walks = content.get("task") == WALKS
+    for entry in ("robot" if walks else "model", "axes"):
         if entry not in content:
             raise InputError(f"there is no '{entry}'", f"add {entry}")
-    names = content["model"]
-    names = [names] if isinstance(names, str) else names
-    if not (isinstance(names, list) and names and all(isinstance(n, str) for n in names)):
-        raise InputError("'model' names no model", 'write model = "PRESET" or a list of them')
+    for entry in ("model",) if walks else ("robot", "gait", "spine"):
+        if entry in content:
+            raise InputError(f"'{entry}' is not for this task", f"leave it, or task = '{WALKS}'")
     for entry in ("axes", "options", "set"):
         if not isinstance(content.get(entry, {}), Mapping):
             raise InputError(f"'{entry}' is not a table", f"write [{entry}]")
-    models = [_changed(load_start(n, place), content.get("set", {})) for n in names]
+    changes = content.get("set", {})
+    models: list[Model | Walker]
+    if walks:
+        models = list(_walkers(content, changes, place))
+    else:
+        models = [_changed(load_start(n, place), changes) for n in _listed(content, "model")]
     axes = [Axis.read(n, what) for n, what in _axes(content["axes"])]
     options = dict(content.get("options", {}))
     if isinstance(options.get("fixed"), Mapping):
         options["fixed"] = flattened(options["fixed"])
     plain = {k: content[k] for k in ("task", "method", "samples", "seed", "chunk") if k in content}
     return Plan(tuple(models), tuple(axes), options=options, **plain)
+
+
+def _listed(content: Mapping[str, Any], entry: str, usual: str | None = None) -> list[str]:
+    """One name or a list of them."""
+    names = content.get(entry, usual)
+    names = [names] if isinstance(names, str) else names
+    if not (isinstance(names, list) and names and all(isinstance(n, str) for n in names)):
+        raise InputError(f"'{entry}' names no {entry}", f'write {entry} = "NAME" or a list of them')
+    return names
+
+
+def _walkers(
+    content: Mapping[str, Any], changes: Mapping[str, Any], place: Path
+) -> Iterator[Walker]:
+    """Every robot with every gait, its spine flexible, locked, or once this and once that."""
+    given = flattened(changes)
+    for name, value in given.items():
+        _check_finite(name, value)
+    spines = _listed(content, "spine", FLEXIBLE)
+    for spine in spines:
+        if spine not in (FLEXIBLE, LOCKED):
+            raise UnknownNameError("spine", spine, (FLEXIBLE, LOCKED))
+    for robot in _listed(content, "robot"):
+        body = load_robot(place / robot if Path(robot).suffix == ".toml" else robot)
+        for gait in _listed(content, "gait", "trot"):
+            walk = load_walk(place / gait if Path(gait).suffix == ".toml" else gait, body.name)
+            walker = Walker(f"{body.name}-{walk.name}", body, walk).with_values(given)
+            for spine in spines:
+                yield walker if spine == FLEXIBLE else walker.with_locked_spine()
+
+
+def _check_finite(name: str, value: Any) -> None:
+    if not is_finite(value):
+        raise ParameterError(f"'{name}' = {shortened(value)} is no number", "give a number")
 
 
 def _axes(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -80,8 +127,7 @@ def _changed(model: Model, table: Mapping[str, Any]) -> Model:
     """A model with some values set."""
     given = flattened(table)
     for name, value in given.items():
-        if not is_finite(value):
-            raise ParameterError(f"'{name}' = {shortened(value)} is no number", "give a number")
+        _check_finite(name, value)
     apex = {name: float(given.pop(name)) for name in list(given) if name in model.apex}
     angles = {
         name.partition(".")[2]: float(given.pop(name))

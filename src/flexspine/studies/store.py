@@ -13,8 +13,8 @@ import os
 import platform
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib.metadata import version
+from contextlib import contextmanager, suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import IO, Any
 from urllib.parse import quote
@@ -31,6 +31,7 @@ ENTRIES = {"key": str, "plan": dict, "made_with": dict}
 TOLD = 3
 
 ANEW = "begin the sweep anew in another directory"
+ENGINE = "mujoco"  # which not everybody has
 LIBRARIES = ("heyoka", "numpy", "scipy", "sympy", "pyarrow")
 
 
@@ -224,7 +225,10 @@ def read_plan_of(path: Path) -> Plan:
 def made_with() -> dict[str, str]:
     """Versions and processor, on which the last bits of results depend."""
     about = {"flexspine": __version__, "python": platform.python_version()}
-    return {**about, **{name: version(name) for name in LIBRARIES}, "processor": _processor()}
+    about |= {name: version(name) for name in LIBRARIES}
+    with suppress(PackageNotFoundError):
+        about[ENGINE] = version(ENGINE)
+    return {**about, "processor": _processor()}
 
 
 def _processor() -> str:

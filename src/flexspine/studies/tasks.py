@@ -20,8 +20,9 @@ from flexspine.parameters import values
 from flexspine.studies.axes import OF_GAITS
 from flexspine.studies.following import Line, LostGaitError, carried
 from flexspine.studies.parts import Part, make_part
-from flexspine.studies.plan import GAITS, RUNS, SEARCHES, Plan
+from flexspine.studies.plan import GAITS, RUNS, SEARCHES, WALKS, Plan
 from flexspine.studies.tables import Row, gait_row
+from flexspine.studies.walkers import Walker, row_names
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -40,13 +41,13 @@ _SAMPLE = "kamimura2015-flexible"
 def do_chunk(work: tuple[Plan, int]) -> Part:
     """Do the task at the points of a chunk."""
     plan, chunk = work
-    table = _runs(plan, chunk) if plan.task == RUNS else _gaits(plan, chunk)
-    return make_part(table)
+    make = {RUNS: _runs, WALKS: _walks}.get(plan.task, _gaits)
+    return make_part(make(plan, chunk))
 
 
 def check_task(plan: Plan) -> None:
     """Try what can be known before anything is done. Raises `InputError`."""
-    for number, model in enumerate(plan.models):
+    for number, model in enumerate(plan.bounders):
         if plan.task == GAITS:
             own = examine(model, tolerance=plan.tolerance)
             if own.flaw is not None:
@@ -73,17 +74,44 @@ def column_of(axis: str) -> str:
     return f"at_{axis.replace('.', '_')}"
 
 
+def _bounder(plan: Plan, chunk: int) -> tuple[Model, int, int]:
+    """The model of a chunk of a sweep in which nobody walks, its first point and their number."""
+    model, first, count = plan.of_chunk(chunk)
+    assert isinstance(model, Model)
+    return model, first, count
+
+
+def _walks(plan: Plan, chunk: int) -> pa.Table:
+    """A walk at every point, each with a seed of its own."""
+    import pyarrow as pa
+
+    walker, first, count = plan.of_chunk(chunk)
+    assert isinstance(walker, Walker)
+    points, options = plan.at(chunk), plan.record()["options"]
+    own = {name: column for name, column in points.items() if name in walker.numbers}
+    names = ["point", *(column_of(axis.name) for axis in plan.axes), *row_names()]
+    rows = []
+    for i in range(count):
+        given = {name: float(column[i]) for name, column in own.items()}
+        seed = np.random.SeedSequence((plan.seed, first + i)).generate_state(1)
+        row: Row = {"point": first + i, **{column_of(n): value for n, value in given.items()}}
+        there = walker.with_values(given) if given else walker
+        rows.append(row | there.row(options["seconds"], options["sensing"], int(seed[0])))
+    schema = pa.schema([(name, _type(name)) for name in names])
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
 def _runs(plan: Plan, chunk: int) -> pa.Table:
     import pyarrow as pa
 
-    model, first, count = plan.of_chunk(chunk)
+    model, first, count = _bounder(plan, chunk)
     points = plan.at(chunk)
     own = {name: column for name, column in points.items() if name in model.numbers}
     own = own or {"height": np.full(count, model.apex["height"])}
     cases = make_cases(model, own, plan.body(model))
     columns = run_cases(cases, plan.options.get("strides", 1), plan.tolerance)
     given = {column_of(name): column for name, column in own.items()}
-    apexes = [f"apex_{name}" for each in plan.models for name in each.apex]
+    apexes = [f"apex_{name}" for each in plan.bounders for name in each.apex]
     names = ["point", *(column_of(axis.name) for axis in plan.axes), "outcome", "strides"]
     names += ["duration", "distance", "apex_time", *dict.fromkeys(apexes)]
     names += [name for name in columns if name not in names]
@@ -128,7 +156,7 @@ def _gait_columns() -> tuple[str, ...]:
 
 def _searched(plan: Plan, chunk: int) -> Iterator[Row]:
     """Every gait found at every point of a chunk, or one row that says that there is none."""
-    model, first, count = plan.of_chunk(chunk)
+    model, first, count = _bounder(plan, chunk)
     points, options = plan.at(chunk), plan.options
     for i in range(count):
         row: Row = {"point": first + i}
@@ -170,7 +198,7 @@ def _request(
 
 def _followed(plan: Plan, chunk: int) -> Iterator[Row]:
     """The gait at every point of a line, followed from the model's own."""
-    model, first, count = plan.of_chunk(chunk)
+    model, first, count = _bounder(plan, chunk)
     points, over = plan.at(chunk), plan.axes[-1].name
     given = _given(model, points)
     rows: list[Row] = [

@@ -1,0 +1,208 @@
+"""``flexspine run3d``: the robot walks in space, in MuJoCo."""
+
+from __future__ import annotations
+
+import re
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flexspine.cli.interrupts import interruptible
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Animation,
+    Json,
+    RobotName,
+    RunDirectory,
+    numbers,
+)
+from flexspine.cli.output import Steps, print_json, steps
+
+if TYPE_CHECKING:
+    from flexspine.control.gains import Walk
+    from flexspine.engines.space_measures import SpaceSummary
+    from flexspine.engines.space_run import SpaceRun
+    from flexspine.models.robot import Robot
+
+# What a run in space writes, in which an earlier one's pictures would pass for its own.
+PICTURES = re.compile(r"(figure|animation|film)\.(png|mp4|gif)")
+
+FILM, FILM_RATE = "film.mp4", 25
+
+OF_WALKS = ("gait.", "servo.")
+
+Walks = Annotated[
+    str, typer.Option("--gait", help="trot, bound, or a TOML file, such as 'tune' writes.")
+]
+WalkAssignments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set a number of the robot, the gait or its servos, e.g. spine.stiffness=300, "
+        "gait.speed=0.4, servo.damping=1.5, space.ground_stiffness=1e5.",
+    ),
+]
+
+
+def run3d(
+    robot: RobotName = DEFAULT_ROBOT,
+    gait: Walks = "trot",
+    set_: WalkAssignments = None,
+    seconds: Annotated[float, typer.Option(help="How long to walk, in s.")] = 15.0,
+    locked: Annotated[
+        bool, typer.Option("--locked", help="Lock the spine: one stiff trunk.")
+    ] = False,
+    plane: Annotated[
+        bool, typer.Option("--plane", help="Keep the robot to the plane of its description.")
+    ] = False,
+    sensing: Annotated[
+        float, typer.Option(help="Read angles of joints off by up to this much, in rad.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(help="Of what is drawn at random.")] = 0,
+    render: Annotated[
+        bool, typer.Option("--render", help="With --out, film it as MuJoCo draws it (OpenGL).")
+    ] = False,
+    out: RunDirectory = None,
+    animation: Animation = True,
+    json: Json = False,
+) -> int:
+    """Let the robot walk in space, drawn by coupled oscillators, in MuJoCo (extra engine).
+
+    It starts standing. Units are SI and radians. Exit code 0: it stayed up; 1: it did not; 2: bad
+    input; 3: MuJoCo or OpenGL is missing, or the machine failed; 130: interrupted.
+
+    Examples:
+        flexspine run3d --gait trot --seconds 15 --out results/trot3d
+
+        flexspine run3d --gait bound --seconds 10 --render --out results/bound3d
+
+        flexspine run3d --locked --set gait.speed=0.4 --json
+    """
+    from flexspine.cli.results import ResultDirectory
+    from flexspine.engines.installed import mujoco_module
+    from flexspine.engines.space_measures import space_record, summarize_space
+    from flexspine.engines.space_run import run_in_space
+
+    interruptible()
+    mujoco_module()
+    body, walk = body_and_walk(robot, gait, set_, locked)
+    with ExitStack() as stack:
+        progress = stack.enter_context(steps())
+        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        progress.begin("walking")
+        run = run_in_space(
+            body, walk, seconds, plane=plane, sensing=sensing, seed=seed, progress=progress.at
+        )
+        summary = summarize_space(run)
+        record = space_record(run, summary)
+        if directory is not None:
+            with directory.stage(PICTURES) as stage:
+                _write(stage, run, record, animation, progress)
+            if render:
+                with directory.stage() as stage:
+                    _film(stage, run, progress)
+    if json:
+        print_json(record)
+    else:
+        print(_report(run, summary))
+        if out is not None:
+            print(f"results in {out}")
+    return 0 if run.outcome.completed else 1
+
+
+def body_and_walk(robot: str, gait: str, given: list[str] | None, lock: bool) -> tuple[Robot, Walk]:
+    """What walks, and how, as options tell it. Raises `InputError`."""
+    from flexspine.control.gains import load_walk
+    from flexspine.control.spine_comparison import spine_of
+    from flexspine.models.locking import locked
+    from flexspine.models.robot_file import load_robot
+
+    told = numbers("--set", given)
+    own = {name: value for name, value in told.items() if not name.startswith(OF_WALKS)}
+    body = load_robot(robot, own)
+    walk = load_walk(gait, body.name)
+    changes = {name: value for name, value in told.items() if name not in own}
+    walk = walk.with_values(changes) if changes else walk
+    return (locked(body, spine_of(body)) if lock else body), walk
+
+
+def _write(
+    stage: Path, run: SpaceRun, record: dict[str, Any], animation: bool, progress: Steps
+) -> None:
+    from flexspine.cli.results import ANIMATIONS, write_json
+    from flexspine.engines.space_dataset import space_dataset
+    from flexspine.models.files import write_netcdf
+    from flexspine.report.animation import animate
+    from flexspine.report.robot_figure import plot_robot
+
+    progress.begin("writing data")
+    dataset = space_dataset(run)
+    write_netcdf(dataset, stage / "trajectory.nc")
+    write_json(record, stage / "summary.json")
+    if dataset.sizes["time"] < 2:
+        return  # nothing to draw
+    progress.begin("drawing")
+    plot_robot(dataset).savefig(stage / "figure.png")
+    if animation:
+        for name in ANIMATIONS:
+            progress.begin(f"drawing {name}")
+            animate(dataset, stage / name, slow_down=1.0, progress=progress.at)
+
+
+def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:
+    import numpy as np
+
+    from flexspine.engines.render import rendered
+    from flexspine.report.film import write_film
+
+    progress.begin(f"filming {FILM}")
+    times = np.arange(0, run.duration, 1 / FILM_RATE)
+    pictures = rendered(run, times)
+    write_film(pictures, stage / FILM, fps=FILM_RATE, count=len(times), progress=progress.at)
+
+
+def _report(run: SpaceRun, summary: SpaceSummary) -> str:
+    """The run in a few lines for a person."""
+    lines = [f"{run.robot.name}, {run.walk.name}: {run.outcome.name} ({run.outcome.message})"]
+    if not run.outcome.completed:
+        lines.append(f"  advice           {run.outcome.advice}")
+    if summary.speed is not None:
+        assert summary.heading is not None
+        assert summary.turning is not None
+        lines.append(
+            f"  steady speed     {summary.speed:.3f} m/s, {summary.strides} strides, "
+            f"{summary.distance:.2f} m; heading {summary.heading:+.3f} rad, turning "
+            f"{summary.turning:+.4f} rad/s"
+        )
+        lines.append(
+            f"  normal forces    mean {summary.normal or 0:.1f} N on feet that stand, impacts "
+            f"{summary.impact or 0:.0f} N, peak {summary.peak_normal:.0f} N"
+        )
+        lines.append(
+            f"  oscillation      CoM height {1e3 * (summary.bounce or 0):.1f} mm, sideways "
+            f"{1e3 * (summary.sway or 0):.1f} mm; roll {summary.roll:.4f}, pitch "
+            f"{summary.pitch:.4f} rad (rms)"
+        )
+        lines += [f"  {name:<16} {angle:.4f} rad (rms)" for name, angle in summary.spine.items()]
+        lines.append(f"  flight           {100 * (summary.flight or 0):.1f} % of the time")
+        lines.append(
+            f"  lost a stride    {summary.contact_loss:.2f} J to the ground, "
+            f"{summary.damper_loss:.2f} J to dampers of joints"
+        )
+        lines.append(f"  tracking error   {summary.error:.4f} rad (rms)")
+    if summary.cost_of_transport is not None:
+        lines.append(f"  cost of transport {summary.cost_of_transport:.3f}")
+    law = next(iter(run.laws.values()))
+    lines += [
+        f"  torque           up to {summary.torque:.1f} N m",
+        f"  contact          f = {law.stiffness:g} N/m depth + {law.damping:g} N s/m rate, "
+        f"friction {run.robot.friction:g}; {1e3 * law.dragged:.0f} g dragged along, creep "
+        f"{1e6 * law.creep:.1f} um/s a newton",
+        f"  depth            up to {1e3 * summary.deepest:.1f} mm",
+        f"  energy           balance closed to {summary.imbalance:.2g} J at steps of "
+        f"{1e3 * run.settings['step']:g} ms",
+    ]
+    return "\n".join(lines)
