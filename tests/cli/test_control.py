@@ -78,6 +78,10 @@ def test_a_push_too_hard_is_told_and_exits_with_1(cli: Cli) -> None:
         (("terrain", "rough", "--with", "height=high"), "height"),
         (("terrain", "none.csv"), "none.csv"),
         (("terrain", "--passive", "--once"), "--passive"),
+        (("terrain", "."), "'.' is no file of ground"),
+        (("terrain", "rough", "--with", "height=-0.01"), "height = -0.01"),
+        (("terrain", "step", "--processes", "-1"), "--processes = -1"),
+        (("control", "--steer", "legs.extension", "--steer", "legs.extension"), "twice"),
         (("robustness", "shove"), "shove"),
         (("robustness", "push", "--body", "cat"), "cat"),
         (("robustness", "push", "--body", "flexible", "--gait", "g.json"), "--gait"),
@@ -88,7 +92,7 @@ def test_a_push_too_hard_is_told_and_exits_with_1(cli: Cli) -> None:
         (("limits", "--stiffness", "260", "--speed", "inf"), "speed"),
         (("limits", "--stiffness", "nan", "--speed", "4.5"), "stiffness"),
         (("robustness", "push", "--speed", "nan"), "speed"),
-        (("robustness", "step", "--largest", "5000", "--runs", "1"), "too high"),
+        (("robustness", "step", "--largest", "5000", "--runs", "1"), "height = 5000"),
         (("robustness", "push", "--gait", "a/gait-1.json", "--gait", "b/gait-1.json"), "gait-1"),
     ],
 )
@@ -122,6 +126,15 @@ def test_terrain_shows_a_run_and_tells_of_many(cli: Cli, tmp_path: Path) -> None
     with Image.open(folder / "animation.gif") as picture:
         assert picture.n_frames > 80  # type: ignore[attr-defined]
     assert not (folder / "terrain.unfinished.jsonl").exists()
+
+
+def test_a_directory_in_the_way_of_a_file_is_told_and_nothing_is_written(
+    cli: Cli, tmp_path: Path
+) -> None:
+    (tmp_path / "here" / "control.png").mkdir(parents=True)
+    done = cli("control", "--strides", "2", "--no-animation", "--out", "here")
+    assert_one_clear_line(done, "here/control.png")
+    assert [entry.name for entry in (tmp_path / "here").iterdir()] == ["control.png"]
 
 
 def test_terrain_from_a_file_and_without_feedback(cli: Cli, tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ BAD = {
     ),
     "no shift": (["--shift", "0.5"], "--shift"),
     "too much of a shift": (["--shift=-2:0.5"], "stiffness_shift"),
-    "a rigid body": (["--preset", "kamimura2015-rigid"], "'spine.damping'"),
+    "a rigid body": (["--preset", "kamimura2015-rigid"], "no spine that bends"),
     "a preset and a gait": (["--preset", "slip", "--gait", "absent.json"], "--gait"),
     "an absent gait": (["--gait", "absent.json"], "absent.json"),
     "backward": (["--speed", "-1"], "speed = -1"),

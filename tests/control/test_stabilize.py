@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from flexspine import Gait, examine, floquet_multipliers, load_model, stride_map
+from flexspine import Gait, Model, examine, floquet_multipliers, load_model, stride_map
 from flexspine.control.stabilize import ANGLES, EFFORT, Stabilizer, stabilize
+from flexspine.control.steered_record import steered_record
 from flexspine.control.steering import Fixed, Noise, Steering, steer
 from flexspine.errors import FlexspineError, ParameterError, UnknownNameError
 
@@ -141,7 +142,7 @@ def test_a_recorded_run_is_the_same_and_can_be_looked_at() -> None:
 
 BAD = {
     "unknown input": ({"inputs": ("touchdown.for",)}, UnknownNameError, "touchdown.fore"),
-    "nothing to steer": ({"inputs": ()}, ParameterError, "missing"),
+    "nothing to steer": ({"inputs": ()}, ParameterError, "nothing to steer"),
     "twice the same": ({"inputs": (ANGLES[0], ANGLES[0])}, ParameterError, "twice"),
     "unknown method": ({"method": "lqg"}, UnknownNameError, "lqr"),
     "no effort": ({"effort": 0.0}, ParameterError, "effort = 0"),
@@ -161,3 +162,47 @@ def test_inputs_that_reach_nothing_are_refused(method: str) -> None:
     """The gait never has both legs on the ground, so a spine that changes then changes nothing."""
     with pytest.raises(FlexspineError, match=r"legs\.extension"):
         stabilize(gait(), ("spine.rest_shift.both",), method=method)
+
+
+def test_energy_of_a_steered_run_is_accounted_for() -> None:
+    """What thrust gave and dampers took is what the energy changed by."""
+    damped = gait().model.with_values({"spine.damping": 0.005})
+    run = steer(damped, design(*THRUST, twice=True), strides=20, noise=Noise(acting=0.002), seed=3)
+    assert run.outcome.completed
+    record = steered_record(run, gait())
+    work = sum(record["net_work"].values())
+    # By hand from the apexes: kinetic, of weight and of the spine; the legs hold none there.
+    start, end = (energy_at(run.model, apex) for apex in (run.apexes[0], run.apexes[-1]))
+    assert record["energy_at_start"] == pytest.approx(start, rel=1e-12)
+    assert record["energy_at_end"] == pytest.approx(end, rel=1e-12)
+    assert record["dissipated"] > 0.1
+    assert abs(work) > 1e-3
+    assert end - start == pytest.approx(work - record["dissipated"], abs=1e-9)
+    assert record["energy_unaccounted"] < 1e-11
+
+
+def energy_at(model: Model, apex: dict[str, float]) -> float:
+    """In flight: both segments have the velocity of the CoM and turn about the joint."""
+    n = model.numbers
+    mass, inertia, arm = (n[f"fore.{each}"] for each in ("mass", "inertia", "spine_offset"))
+    fore, hind = apex["fore_pitch"], apex["hind_pitch"]
+    turning = (apex["fore_pitch_rate"] + apex["hind_pitch_rate"]) / 2
+    bending = (apex["fore_pitch_rate"] - apex["hind_pitch_rate"]) / 2
+    phi = (fore - hind) / 2
+    kinetic = mass * apex["speed"] ** 2
+    kinetic += (inertia + mass * arm**2 * np.cos(phi) ** 2) * turning**2
+    kinetic += (inertia + mass * arm**2 * np.sin(phi) ** 2) * bending**2
+    spring = n["spine.stiffness"] * (fore - hind) ** 2 / 2
+    return float(kinetic + 2 * mass * n["gravity"] * apex["height"] + spring)
+
+
+def test_feedback_for_another_kind_of_body_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"'flexible-bounder' cannot steer 'rigid-bounder'"):
+        steer(load_model("scout2"), design(*ANGLES), strides=2)
+
+
+def test_advice_after_a_fall_is_about_the_feedback() -> None:
+    run = steer(gait().model, design(*ANGLES), strides=300, noise=Noise(acting=0.5), seed=1)
+    record = steered_record(run, gait(), design(*ANGLES))
+    assert record["outcome"] == "fell"
+    assert "steer otherwise" in record["advice"]

@@ -111,7 +111,7 @@ def test_ground_is_read_from_csv(tmp_path: Path) -> None:
         ("x,y\n0\n", "line 2"),
         ("0,inf\n", "line 1"),
         ("1,0\n0,0\n", "goes back"),
-        ("", "0 points"),
+        ("", "track.csv. has no points"),
         ("0,1e9\n", "too high"),
         ("1,0\n1,0.5\n1,0\n", "two for a face"),
         ("1,0\n1.0001,0.5\n", "same x"),

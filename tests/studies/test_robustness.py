@@ -300,3 +300,12 @@ def test_the_seed_draws_where_the_ground_begins() -> None:
     begins = everywhere(lambda seed: Terrain("step", {}).ground(seed, 1.2, 5).points[0][0])
     assert len(begins) == 20
     assert 1.0 <= min(begins) < max(begins) <= 2.2
+
+
+def test_what_cannot_be_disturbed_is_refused() -> None:
+    with pytest.raises(ParameterError, match="no animal"):
+        survive({}, "push")
+    with pytest.raises(ParameterError, match="stride = -1"):
+        distance_to_fall(steered().gait.model, steered(), Terrain("rough", {}), stride=-1.0)
+    with pytest.raises(ParameterError, match="'rough' is no ground"):
+        steered().gait.model.on("rough")  # type: ignore[arg-type]

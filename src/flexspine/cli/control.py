@@ -121,9 +121,21 @@ def report(record: dict[str, Any]) -> str:
         f"  deviation        {record['largest_deviation']:.3g} at most, "
         f"{record['last_deviation']:.3g} at the end (natural units)",
     ]
+    lines.append(_energy(record))
     if record["outcome"] != "completed":
         lines.append(f"  advice           {record['advice']}")
     return "\n".join(lines)
+
+
+def _energy(record: dict[str, Any]) -> str:
+    """Where energy came from and went, in one line."""
+    told = [f"{record['energy_at_start']:.3f} J at the start, {record['energy_at_end']:.3f} J now"]
+    if record["dissipated"]:
+        told.append(f"dissipated {record['dissipated']:.3f} J")
+    told += [f"{n.replace('_', ' ')} {net:+.3f} J" for n, net in record["net_work"].items()]
+    if record["energy_unaccounted"] is not None:
+        told.append(f"balance closed to {record['energy_unaccounted']:.1e}")
+    return f"  energy           {', '.join(told)}"
 
 
 def _feedback(record: dict[str, Any]) -> list[str]:

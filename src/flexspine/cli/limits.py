@@ -54,10 +54,10 @@ def limits(
 
     A gait is carried to every stiffness and speed at its energy and apex height, and stabilised by
     touchdown angles alone, once or at both flight apexes, and by thrust too. Survived are: noise,
-    1000 strides for six seeds; a push (N s), 50 strides; a step (m), 50 strides wherever it stands
-    in the first. Sizes are found by doubling and bisection, to a tenth of themselves. Interrupted,
-    the same command goes on. Units are SI. Exit code 0: done; 1: no gait was found or stabilised;
-    2: bad input; 3: the machine failed; 130: interrupted.
+    1000 strides for six seeds; a push (N s), 50 strides; a step (m), 50 strides, at eight places
+    in the first: between these a lower one may trip. Sizes are found by doubling and bisection, to
+    a tenth of themselves. Interrupted, the same command goes on. Units are SI. Exit code 0: done;
+    1: no gait was found or stabilised; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine limits --out results/limits

@@ -158,7 +158,7 @@ def _ranges(
 ) -> dict[str, tuple[float, float]]:
     for name in keep or []:
         if name not in ranges:
-            raise UnknownNameError("default of what varies", name, ranges)
+            raise UnknownNameError("quantity that varies by default (--keep)", name, ranges)
         del ranges[name]
     for item in vary or []:
         name, equals, ends = item.partition("=")

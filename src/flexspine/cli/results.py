@@ -55,6 +55,8 @@ class ResultDirectory:
             yield stage
             made = sorted(stage.iterdir())
             for file in made:
+                self._refuse_directory(file.name)
+            for file in made:
                 file.replace(self.path / file.name)
             older = [] if replaced is None else sorted(self.path.iterdir())
             for name in {file.name for file in older} - {file.name for file in made}:
@@ -62,6 +64,13 @@ class ResultDirectory:
                     (self.path / name).unlink(missing_ok=True)
         finally:
             shutil.rmtree(stage, ignore_errors=True)
+
+    def _refuse_directory(self, name: str) -> None:
+        if (self.path / name).is_dir():
+            raise OutputError(
+                f"'{self.path / name}' is a directory where a file is to be written",
+                "move it elsewhere, or give --out another directory",
+            )
 
     def write(
         self, run: Run, record: dict[str, Any], interval: float, animation: bool, progress: Steps

@@ -147,6 +147,7 @@ def _record(found: Robustness, animals: dict[str, Stabilizer]) -> dict[str, Any]
         "disturbance": found.kind.name,
         "about": found.kind.about,
         "unit": found.kind.unit,
+        "sides": list(found.kind.sides),
         "largest": found.largest,
         "strides": found.strides,
         "seed": found.seed,
@@ -191,16 +192,12 @@ def _write(stage: Path, found: Robustness, record: dict[str, Any]) -> None:
 
 def _report(record: dict[str, Any]) -> str:
     """What each animal survives, for a person."""
-    unit = "" if record["unit"] == "1" else f" {record['unit']}"
-    lines = [
-        f"{record['about']}, up to {record['largest']:g}{unit}; survived: {record['strides']} "
-        "strides made"
-    ]
+    largest = _size(record["largest"], record["unit"])
+    lines = [f"{record['about']}, up to {largest}; survived: {record['strides']} strides made"]
     for name, each in record["animals"].items():
         lines.append(f"{name}: {each['survived']} of {each['runs']} runs survived")
-        for side in ("positive", "negative"):
-            if side in each:
-                lines.append(f"  {side:<9} {_limits(each[side], unit)}")
+        for side, name in zip(("positive", "negative"), record["sides"], strict=False):
+            lines.append(f"  {name:<11} {_limits(each[side], record['unit'])}")
     return "\n".join(lines)
 
 
@@ -210,7 +207,13 @@ def _limits(side: dict[str, Any], unit: str) -> str:
         return "no runs"
     if side["all_survived_up_to"] is None:
         return f"all survived ({ended})"
-    return (
-        f"all up to {side['all_survived_up_to']:.3g}{unit}, "
-        f"typically up to {side['typically_survived_up_to']:.3g}{unit} ({ended})"
+    most, typical = (
+        _size(side[name], unit) for name in ("all_survived_up_to", "typically_survived_up_to")
     )
+    return f"all up to {most}, typically up to {typical} ({ended})"
+
+
+def _size(size: float, unit: str) -> str:
+    """A size for a person: lengths in mm, shares in percent."""
+    factor, shown = {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
+    return f"{factor * size:.3g} {shown}"

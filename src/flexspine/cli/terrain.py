@@ -102,7 +102,7 @@ def terrain(
         raise InputError(
             "--passive is given, and how to steer too", "leave --steer, --method, --once, --effort"
         )
-    where = Terrain(kind, numbers("--with", with_))
+    where, workers = Terrain(kind, numbers("--with", with_)), count_of(processes)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         start = starting_gait(gait, preset, set_, None, progress)
@@ -121,7 +121,7 @@ def terrain(
             with counting("runs") as count:
                 ensemble = distance_to_fall(
                     start.model, steering, where, stride=start.stride_length, strides=strides,
-                    runs=runs, seed=seed, processes=count_of(processes), store=store,
+                    runs=runs, seed=seed, processes=workers, store=store,
                     progress=count,
                 )  # fmt: skip
             record["ensemble"] = _ensemble_record(ensemble)
@@ -186,8 +186,9 @@ def _write_ensemble(found: Wayfaring, record: dict[str, Any], stage: Path) -> No
 
 def _report(record: dict[str, Any]) -> str:
     """The run, and many more, in a few lines for a person."""
-    lines = [report(record)]
     many = record.get("ensemble")
+    lines = [f"the run of seed {record['seed']}, one of them:"] if many else []
+    lines.append(report(record))
     if many:
         ended = ", ".join(f"{count} {name}" for name, count in many["outcomes"].items())
         lines.append(f"{many['runs']} runs of up to {many['strides']} strides: {ended}")

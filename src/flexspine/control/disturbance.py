@@ -38,14 +38,19 @@ Maker = Callable[[Gait, Draw, int], Upset]
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A kind of disturbance. ``signed`` ones have a size to either side."""
+    """A kind of disturbance: ``sides`` names those to which it may go, the positive one first."""
 
     name: str
     about: str
     unit: str
-    signed: bool
+    sides: tuple[str, ...]
     largest: float
     make: Maker
+
+    @property
+    def signed(self) -> bool:
+        """Whether it has a size to either side."""
+        return len(self.sides) == 2
 
 
 def _push(gait: Gait, drawn: Draw, _strides: int) -> Upset:
@@ -84,15 +89,20 @@ def _sensing(gait: Gait, drawn: Draw, _strides: int) -> Upset:
 # m; of rough ground. It is so much longer than the undisturbed way, for those that get faster.
 SPACING, LONGER = 0.3, 1.5
 
+# The one side of what has no other.
+EITHER = ("of any kind",)
+
 DISTURBANCES: Mapping[str, Disturbance] = {
     kind.name: kind
     for kind in (
-        Disturbance("push", "push forward at the first apex", "N s", True, 20.0, _push),
-        Disturbance("step", "step up or down, anywhere in a stride", "m", True, 0.06, _step),
-        Disturbance("rough", "height of rough ground", "m", False, 0.03, _rough),
-        Disturbance("blocks", "height of blocks", "m", False, 0.02, _blocks),
-        Disturbance("acting", "Gaussian noise on what is steered", "1", False, 0.03, _acting),
-        Disturbance("sensing", "Gaussian noise on the apex", "1", False, 0.03, _sensing),
+        Disturbance("push", "push at the first apex", "N s", ("forward", "backward"), 20.0, _push),
+        Disturbance(
+            "step", "step up or down, anywhere in a stride", "m", ("up", "down"), 0.06, _step
+        ),
+        Disturbance("rough", "height of rough ground", "m", EITHER, 0.03, _rough),
+        Disturbance("blocks", "height of blocks", "m", EITHER, 0.02, _blocks),
+        Disturbance("acting", "Gaussian noise on what is steered", "1", EITHER, 0.03, _acting),
+        Disturbance("sensing", "Gaussian noise on the apex", "1", EITHER, 0.03, _sensing),
     )
 }
 

@@ -77,6 +77,14 @@ class Stabilizer(Steering):
             "gains": [gain.tolist() for gain in self.gains],
         }
 
+    def check(self, model: Model) -> None:
+        """Raise `ParameterError` for a model of another kind than the gait's."""
+        if model.kind is not self.gait.model.kind:
+            raise ParameterError(
+                f"feedback for '{self.gait.model.kind.name}' cannot steer '{model.kind.name}'",
+                "design it on a gait of this model",
+            )
+
     @property
     def twice(self) -> bool:
         """Whether it acts between the stances too."""
@@ -153,8 +161,11 @@ def stabilize(
     for name in inputs:
         if name not in names:
             raise UnknownNameError("parameter", name, names)
-    if not inputs or len(set(inputs)) < len(inputs):
-        raise ParameterError("inputs are missing, or named twice", f"give {', '.join(ANGLES)}")
+    if not inputs:
+        raise ParameterError("there is nothing to steer", f"steer {', '.join(ANGLES)}")
+    for name in inputs:
+        if inputs.count(name) > 1:
+            raise ParameterError(f"'{name}' is to be steered twice", "name it once")
     if method == "deadbeat" and twice:
         raise ParameterError("deadbeat feedback acts once a stride", "take lqr to act twice")
     parts = _parts(gait, inputs, twice)
@@ -190,7 +201,7 @@ def _parts(gait: Gait, inputs: tuple[str, ...], twice: bool) -> tuple[Part, ...]
         if not trajectory.outcome.completed:
             raise FlexspineError(
                 f"the gait has no apex between its stances ({trajectory.outcome})",
-                "act once a stride",
+                "act once a stride (--once)",
             )
         found = linearize(trajectory, symbols)
         at = section_rows(system)

@@ -9,10 +9,12 @@ import numpy as np
 
 from flexspine._version import SCHEMA_VERSION
 from flexspine.control.stabilize import Stabilizer
-from flexspine.control.steering import SteeredRun
+from flexspine.control.steering import Fixed, SteeredRun
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.record import finite
 from flexspine.gaits.stability import floquet_multipliers
+from flexspine.models.bounder import DISSIPATED, FELL, works
+from flexspine.models.dataset import ENERGIES
 from flexspine.parameters import values
 
 
@@ -74,15 +76,44 @@ def steered_record(
         "ground": run.model.ground.name if run.model.ground else None,
         "outcome": run.outcome.name,
         "message": run.outcome.message,
-        "advice": run.outcome.advice,
+        "advice": _advice(run),
         "strides": len(run.trajectory.crossings),
         "duration": end.time - start.time,
         "distance": distance,
         "achieved_speed": distance / (end.time - start.time) if end.time > start.time else None,
+        **_energy(run),
         "largest_deviation": max((row["deviation"] for row in rows), default=0.0),
         "last_deviation": rows[-1]["deviation"] if rows else 0.0,
     }
     return {key: finite(value) for key, value in record.items()}
+
+
+def _energy(run: SteeredRun) -> dict[str, Any]:
+    """Energy at the start and the end, what became of it between, and what is unaccounted for."""
+    trajectory, bound = run.trajectory, run.trajectory.bound
+    points = (trajectory.start, trajectory.end)
+    places = bound.system.places
+    seen = [bound.observe(p.mode, p.states[None], p.held[None]) for p in points]
+    total = [sum(float(each[kind][0]) for kind in ENERGIES) for each in seen]
+    lost = [float(point.states[places[DISSIPATED]]) for point in points]
+    work = {
+        name: float(points[1].states[places[symbol]] - points[0].states[places[symbol]])
+        for name, symbol in works(run.model.keeping(run.steering.inputs).features).items()
+    }
+    off = total[1] - total[0] + lost[1] - lost[0] - sum(work.values())
+    return {
+        "energy_at_start": total[0],
+        "energy_at_end": total[1],
+        "dissipated": lost[1] - lost[0],
+        "net_work": work,
+        "energy_unaccounted": abs(off) / abs(total[0]) if total[0] else None,
+    }
+
+
+def _advice(run: SteeredRun) -> str:
+    if run.outcome.name == FELL.name and not isinstance(run.steering, Fixed):
+        return "disturb it less, or steer otherwise: other inputs, twice a stride, another effort"
+    return run.outcome.advice
 
 
 def apex_table(run: SteeredRun, gait: Gait) -> list[dict[str, float]]:

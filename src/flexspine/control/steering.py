@@ -69,6 +69,10 @@ class Steering(ABC):
         """All that decides what it does, for a file."""
 
     @abstractmethod
+    def check(self, model: Model) -> None:
+        """Raise `ParameterError` if this steering is not for such a model."""
+
+    @abstractmethod
     def at_apex(self, apex: Array) -> Array:
         """The inputs (u,) for section coordinates (d,) at an apex after both stances.
 
@@ -91,6 +95,9 @@ class Fixed(Steering):
     def settings(self) -> dict[str, Any]:
         """The inputs and their values."""
         return dict(zip(self.inputs, self.values.tolist(), strict=True))
+
+    def check(self, model: Model) -> None:
+        """Any will do."""
 
     def at_apex(self, apex: Array) -> Array:
         """The same as ever."""
@@ -137,6 +144,7 @@ class SteeredBounder(OnGround):
         system = steered_system(model.system, symbols)
         own = dict(zip(model.system.parameters, model.parameter_vector.tolist(), strict=True))
         numbers = np.array([own[symbol] for symbol in system.parameters])
+        steering.check(model)
         super().__init__(compile_system(system, tolerance), numbers, model.ground)
         self.model, self.steering, self.noise = model, steering, noise
         self._random = np.random.default_rng(seed)

@@ -74,6 +74,10 @@ VARIABLES: dict[str, tuple[str, str]] = {
 PHASE_CODES = {phase: code for code, phase in enumerate(PHASES)}
 
 
+# What adds up to the total energy.
+ENERGIES = ("kinetic_energy", "gravity_energy", "leg_energy", "spine_energy")
+
+
 def sample_times(trajectory: Trajectory, interval: float) -> Array:
     """Return a regular grid of times over a run, the end included, in s.
 
@@ -132,8 +136,7 @@ def sample(run: Run, times: Array) -> dict[str, Array]:
             column(name)[part] = values_
         for name, values_ in run.trajectory.observe(arc, states).items():
             column(name)[part] = values_
-    kinds = ("kinetic_energy", "gravity_energy", "leg_energy", "spine_energy")
-    columns["total_energy"] = sum((columns[kind] for kind in kinds), np.zeros(len(times)))
+    columns["total_energy"] = sum((columns[kind] for kind in ENERGIES), np.zeros(len(times)))
     return columns
 
 

@@ -155,6 +155,7 @@ class Ground:
     @classmethod
     def step(cls, height: float, at: float = BEGINS) -> Ground:
         """One step up by ``height`` m (down if negative), its face at x = ``at``."""
+        _check("height", height, -HIGHEST, HIGHEST)
         return cls(f"step of {height:g} m", ((at, 0.0), (at, height)))
 
     @classmethod
@@ -162,6 +163,7 @@ class Ground:
         cls, height: float, length: float = 1.0, count: int = 5, at: float = BEGINS
     ) -> Ground:
         """``count`` steps by ``height`` m, each ``length`` m after the one before."""
+        _check("height", height, -HIGHEST, HIGHEST)
         _check("length", length, 1e-3, 1e6)
         _check("count", count, 1, MOST_POINTS / 2)
         if count != int(count):
@@ -173,6 +175,7 @@ class Ground:
     @classmethod
     def ramp(cls, height: float, length: float = 1.0, at: float = BEGINS) -> Ground:
         """Up by ``height`` m over ``length`` m, and level again."""
+        _check("height", height, -HIGHEST, HIGHEST)
         _check("length", length, 1e-3, 1e6)
         return cls(f"ramp of {height:g} m over {length:g} m", ((at, 0.0), (at + length, height)))
 
@@ -185,6 +188,8 @@ class Ground:
     @classmethod
     def waves(cls, amplitude: float, wavelength: float = 1.0, at: float = BEGINS) -> Ground:
         """From x = ``at`` on a sinusoid."""
+        _check("amplitude", amplitude, -HIGHEST, HIGHEST)
+        _check("wavelength", wavelength, 1e-3, 1e6)
         name = f"waves of {amplitude:g} m, {wavelength:g} m long"
         return cls(name, ((at, 0.0),), amplitude=amplitude, wavelength=wavelength)
 
@@ -228,6 +233,8 @@ class Ground:
         except (OSError, UnicodeDecodeError, csv.Error) as failure:
             reason = getattr(failure, "strerror", None) or failure
             raise InputError(f"'{file}' cannot be read ({reason})", "give a CSV file") from failure
+        if not points:
+            raise InputError(f"'{file}' has no points", "write x,y in metres, one to a line")
         return cls(file.name, points)
 
 
@@ -240,7 +247,7 @@ def _check(what: str, value: float, low: float, high: float) -> None:
 
 
 def _drawn(height: float, spacing: float, length: float, seed: int) -> list[float]:
-    _check("height", height, -HIGHEST, HIGHEST)
+    _check("height", height, 0, HIGHEST)
     _check("spacing", spacing, 1e-3, 1e6)
     _check("length", length, 0, 1e6)
     if spacing > length:

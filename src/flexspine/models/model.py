@@ -131,7 +131,11 @@ class Model:
         return replace(self, kept=self.kept | Features.of(dict.fromkeys(names, 1.0)))
 
     def on(self, ground: Ground | None) -> Model:
-        """Return the same model on other ground; None is flat."""
+        """Return the same model on other ground; None is flat. Raises `ParameterError`."""
+        if not (ground is None or isinstance(ground, Ground)):
+            raise ParameterError(
+                f"{shortened(ground)} is no ground", "make one, such as Ground.rough(0.01)"
+            )
         return replace(self, ground=ground)
 
     def on_flat_ground(self, what: str) -> None:

@@ -22,7 +22,8 @@ from flexspine.models.ground import SIGHT, Ground, Piece
 
 STUMBLED = OutcomeKind(
     "stumbled",
-    "a foot or the body met a vertical face; lower the steps, or lift the feet higher",
+    "a foot or the body met a vertical face; lower it, or meet it elsewhere in a stride, as legs "
+    "keep their length in the air",
 )
 
 # m; a piece that ends so far behind is none: the ground has to be looked up.

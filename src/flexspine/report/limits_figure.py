@@ -40,7 +40,9 @@ def plot_limits(cells: Sequence[Cell]) -> Figure:
         zip(stiffnesses, colormaps["viridis"](np.linspace(*SHADES, len(stiffnesses))), strict=True)
     )
     with themed():
-        details = ["Gaussian noise, six seeds, 1000 strides; pushes and steps, 50 strides"]
+        details = [
+            "Gaussian noise: six seeds, 1000 strides; pushes, steps (at eight places): 50 strides"
+        ]
         size = (1.0 + PANEL[0] * len(designs), 0.9 + PANEL[1] * len(names) + LINE * len(details))
         figure = Figure(figsize=size, layout="constrained")
         panels = figure.subplots(len(names), len(designs), sharex=True, sharey="row", squeeze=False)

@@ -51,9 +51,18 @@ class Design:
     def __post_init__(self) -> None:
         model = self.model
         known = {**model.numbers, "energy": self.gait.energy}
-        for name, (low, high) in self.ranges.items():
+        for name, ends in self.ranges.items():
+            bends = any(each.startswith("spine.") for each in known)
+            if name.startswith("spine.") and not bends:
+                raise ParameterError(
+                    f"'{model.name}' has no {name}, as it has no spine that bends",
+                    "give an animal that has one, or keep what it lacks as it is",
+                )
             if name not in known:
                 raise UnknownNameError("parameter or quantity", name, known)
+            if len(ends) != 2:
+                raise ParameterError(f"{name} = {shortened(ends)} is no range", "give low and high")
+            low, high = ends
             if not (is_finite(low) and is_finite(high) and low < high):
                 shown = f"{shortened(low)} to {shortened(high)}"
                 raise ParameterError(f"{name} from {shown} is no range", "give low before high")

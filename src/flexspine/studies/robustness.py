@@ -179,6 +179,8 @@ def survive(
     check_seed(seed)
     check_runs(runs)
     check_count("strides", strides)
+    if not animals:
+        raise ParameterError("there is no animal to disturb", "give one or more by name")
     for each in animals.values():  # what cannot be made is refused before anything is done
         for sign in (1, -1) if what.signed else (1,):
             what.make(each.gait, Draw(sign * largest, 0.5, seed), strides)

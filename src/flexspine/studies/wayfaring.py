@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from flexspine.control.steering import SteeredRun, Steering, steer
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.hybrid.compile import Array
 from flexspine.models.ground import BEGINS, Ground
-from flexspine.models.model import Model
+from flexspine.models.model import Model, check_between
 from flexspine.models.simulation import check_count
 from flexspine.studies.robustness import about, check_runs
 from flexspine.workers.lasting import do_all
@@ -55,6 +56,10 @@ class Terrain:
         """The ground for a seed, strides of ``stride`` m. Raises `InputError`."""
         if self.track is not None:
             return self.track
+        if self.kind not in KINDS and Path(self.kind).exists():
+            raise ParameterError(
+                f"'{self.kind}' is no file of ground", "give a file whose name ends in .csv"
+            )
         if self.kind not in KINDS:
             raise UnknownNameError("kind of ground", self.kind, KINDS)
         make, known = KINDS[self.kind]
@@ -172,6 +177,7 @@ def distance_to_fall(
     """
     check_runs(runs)
     check_count("strides", strides)
+    check_between("stride", stride, 0, inf)
     terrain.ground(seed, stride, strides)  # refused before anything is done
     if terrain.track is not None and runs > 1:
         raise ParameterError(
