@@ -19,6 +19,7 @@ from flexspine.cli import (
     cache,
     control,
     equations,
+    export,
     forces,
     gait,
     gait_map,
@@ -31,6 +32,7 @@ from flexspine.cli import (
     sweep,
     terrain,
     trot,
+    tune,
     verify,
 )
 from flexspine.cli.output import fail
@@ -72,9 +74,11 @@ app.command("limits")(limits.limits)
 app.command("optimise")(optimise.optimise)
 app.command("trot")(trot.trot)
 app.command("run3d")(run3d.run3d)
+app.command("tune")(tune.tune)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
+app.add_typer(export.app, name="export")
 app.add_typer(verify.app, name="verify")
 app.add_typer(cache.app, name="cache")
 

@@ -37,7 +37,7 @@ class PinnedMujoco:
     def __init__(self, linkage: Linkage, foot: str) -> None:
         self._mujoco = mujoco_module()
         self._tree = rerooted(linkage, foot)
-        self.model = _specification(self._mujoco, self._tree).compile()
+        self.model = pinned_specification(self._mujoco, linkage, foot).compile()
         self.data = self._mujoco.MjData(self.model)
         # Where each of the tree's links stands among those of the linkage.
         self._order = [linkage.place[link.name] for link in self._tree.links]
@@ -84,8 +84,12 @@ class PinnedMujoco:
             self._mujoco.set_mju_user_warning(before)
 
 
-def _specification(mujoco: Any, tree: Linkage) -> Any:
-    """The tree in MuJoCo's terms: our plane is that of its x and y, gravity acts against y."""
+def pinned_specification(mujoco: Any, linkage: Linkage, foot: str) -> Any:
+    """A linkage pinned by a foot, as an `MjSpec`.
+
+    Our plane is that of its x and y, gravity acts against y. Raises `UnknownNameError`.
+    """
+    tree = rerooted(linkage, foot)
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE

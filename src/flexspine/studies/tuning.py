@@ -132,7 +132,7 @@ def tune(
     if rhythm not in ("trot", "bound"):
         raise UnknownNameError("rhythm", rhythm, ("trot", "bound"))
     check_between("speed", speed, -5, 5)
-    check_between("seconds", seconds, 1, 600)
+    check_between("seconds", seconds, 0.5, 600)
     for name, count in (("draws", draws), ("rounds", rounds), ("children", children)):
         check_count(name, count)
     SpaceRobot(robot)
