@@ -28,6 +28,7 @@ from flexspine.cli import (
     presets,
     robustness,
     run3d,
+    spines,
     study,
     sweep,
     terrain,
@@ -74,6 +75,7 @@ app.command("limits")(limits.limits)
 app.command("optimise")(optimise.optimise)
 app.command("trot")(trot.trot)
 app.command("run3d")(run3d.run3d)
+app.command("spines")(spines.spines)
 app.command("tune")(tune.tune)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
