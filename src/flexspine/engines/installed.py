@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -37,3 +39,14 @@ def mujoco_module() -> Any:
             REMEDY,
         )
     return mujoco
+
+
+@contextmanager
+def unheard(mujoco: Any) -> Iterator[None]:
+    """Keep MuJoCo's warnings out of the terminal, and its log out of the working directory."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

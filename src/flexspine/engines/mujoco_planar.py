@@ -6,13 +6,11 @@ constraints are springs, and would let it give way.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexspine.engines.installed import LEAST_INERTIA, mujoco_module
+from flexspine.engines.installed import LEAST_INERTIA, mujoco_module, unheard
 from flexspine.mechanics.linkage import Array, Link, Linkage
 from flexspine.mechanics.rerooting import rerooted
 
@@ -51,7 +49,7 @@ class PinnedMujoco:
         self.model.opt.timestep = step
         self.data.qpos[:] = self._relative(angles)
         found = [self._now()]
-        with self._unheard():
+        with unheard(self._mujoco):
             for number in range(1, count + 1):
                 self._mujoco.mj_step(self.model, self.data)
                 if number % every == 0:
@@ -72,16 +70,6 @@ class PinnedMujoco:
         n = len(angles)
         angles[self._order] = self._tree.to_absolute[:n, :n] @ self.data.qpos
         return angles, float(self.data.energy.sum())
-
-    @contextmanager
-    def _unheard(self) -> Iterator[None]:
-        """Keep MuJoCo's warnings out of the terminal, and its log out of the working directory."""
-        before = self._mujoco.get_mju_user_warning()
-        self._mujoco.set_mju_user_warning(lambda _text: None)
-        try:
-            yield
-        finally:
-            self._mujoco.set_mju_user_warning(before)
 
 
 def pinned_specification(mujoco: Any, linkage: Linkage, foot: str) -> Any:

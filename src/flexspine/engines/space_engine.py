@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexspine.engines.contact import ContactLaw
-from flexspine.engines.installed import mujoco_module
+from flexspine.engines.installed import mujoco_module, unheard
 from flexspine.engines.mjcf import ROOT_PITCH, ROOT_X, ROOT_Z, Start, specification
 from flexspine.hybrid.compile import Array
 from flexspine.models.space import SpaceRobot
@@ -169,12 +168,6 @@ class SpaceEngine:
         boxes = [part for part in self.space.parts if part.name in self.space.trunk]
         return np.array([shares * (box.length, box.width, box.height) for box in boxes])
 
-    @contextmanager
-    def unheard(self) -> Iterator[None]:
+    def unheard(self) -> AbstractContextManager[None]:
         """Keep MuJoCo's warnings out of the terminal, and its log out of the working directory."""
-        before = self._mujoco.get_mju_user_warning()
-        self._mujoco.set_mju_user_warning(lambda _text: None)
-        try:
-            yield
-        finally:
-            self._mujoco.set_mju_user_warning(before)
+        return unheard(self._mujoco)
