@@ -13,6 +13,7 @@ from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import DEFAULT_ROBOT, Assignments, Json, RobotName, assignments
 from flexspine.cli.output import Steps, print_json, steps
+from flexspine.cli.verify_engines import engines
 
 if TYPE_CHECKING:
     from flexspine.studies.pinned_check import PinnedCase, PinnedCheck
@@ -23,6 +24,9 @@ app = typer.Typer(help="What we compute against engines that others wrote.", no_
 @app.callback()
 def _group() -> None:
     pass
+
+
+app.command("engines")(engines)
 
 
 @app.command("pinned")

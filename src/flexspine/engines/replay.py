@@ -64,7 +64,7 @@ def replay(robot: Robot, motion: Motion, *, step: float) -> Replay:
         np.stack([table[name] for name in names], axis=1)
         for table in (space.angles(motion.q), space.rates(motion.rates))
     )
-    torques = motion.torques @ _by_hinge(space).T
+    torques = motion.torques @ space.by_motor.T
     place, pitch = space.root(motion.q[0])
     engine.set_down(
         Start(
@@ -101,15 +101,6 @@ def replay(robot: Robot, motion: Motion, *, step: float) -> Replay:
         outcome, motion.times[:count], com, angle, wanted[:count], normals, most_pull,
         next((i for i, hinge in enumerate(space.hinges) if not hinge.motor), None),
     )  # fmt: skip
-
-
-def _by_hinge(space: SpaceRobot) -> Array:
-    """The torques of hinges from those of planar motors, by equal power, shape (hinges, m)."""
-    linkage = space.robot.linkage
-    rates = space.rates(np.eye(linkage.size))
-    turning = np.array([rates[name] for name in space.motors])
-    found: Array = np.linalg.lstsq(turning.T, linkage.actuation, rcond=None)[0]
-    return found
 
 
 def _row(engine: SpaceEngine, normal: Array, most: float) -> tuple[Array, Array, Array, float]:

@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 
+import numpy as np
+
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.models.leg_geometry import Leg, legs_of
@@ -168,6 +170,18 @@ class SpaceRobot:
             thigh, shank = links[leg.thigh], links[leg.shank]
             found[names.hip] = thigh[0] - turned, thigh[1]
             found[names.knee] = shank[0] - thigh[0], shank[1] - thigh[1]
+        return found
+
+    @cached_property
+    def by_motor(self) -> Array:
+        """The torques of motors in space by those of planar ones, shape (motors, m).
+
+        Both do the same work in any motion in the plane.
+        """
+        linkage = self.robot.linkage
+        rates = self.rates(np.eye(linkage.size))
+        turning = np.array([rates[name] for name in self.motors])
+        found: Array = np.linalg.lstsq(turning.T, linkage.actuation, rcond=None)[0]
         return found
 
     def root(self, q: Array) -> tuple[Array, Array]:
