@@ -12,6 +12,7 @@ from flexspine._version import __version__
 if TYPE_CHECKING:
     from flexspine.control.cpg import Cpg, rhythm
     from flexspine.control.distribution import Aim, ForceFamily, force_family
+    from flexspine.control.gains import Walk, load_walk, walk_names
     from flexspine.control.leg_function import standing
     from flexspine.control.spine_comparison import SpineComparison, compare_spines
     from flexspine.control.stabilize import Stabilizer, stabilize
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from flexspine.control.trot import Trot, trot
     from flexspine.control.walk_measures import WalkSummary, summarize_walk
     from flexspine.control.walk_plan import Pace
+    from flexspine.engines.space_dataset import space_dataset
+    from flexspine.engines.space_measures import SpaceSummary, summarize_space
+    from flexspine.engines.space_run import SpaceRun, run_in_space
     from flexspine.errors import FlexspineError, InputError, MachineError
     from flexspine.gaits.continuation import Branch, trace_branch
     from flexspine.gaits.files import load_gait, save_gait
@@ -41,12 +45,14 @@ if TYPE_CHECKING:
     from flexspine.report.animation import animate, strip
     from flexspine.report.basin_figure import plot_basin
     from flexspine.report.coordinates_figure import plot_coordinates
+    from flexspine.report.engines_figure import plot_engines
     from flexspine.report.figure import plot_run
     from flexspine.report.map_figure import plot_map
     from flexspine.report.pareto_figure import plot_fronts
     from flexspine.report.pinned_figure import plot_pinned
     from flexspine.report.robot_figure import plot_robot
     from flexspine.report.robustness_figure import plot_robustness
+    from flexspine.report.walks_figure import plot_walks
     from flexspine.studies.basin import Basin, basin_plan, read_basins
     from flexspine.studies.front_record import front_record
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
@@ -55,8 +61,13 @@ if TYPE_CHECKING:
     from flexspine.studies.pinned_check import PinnedCheck, check_pinned
     from flexspine.studies.plan import Plan
     from flexspine.studies.plan_file import read_plan
+    from flexspine.studies.replay_check import check_replay
     from flexspine.studies.robustness import survive
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
+    from flexspine.studies.template_check import check_template
+    from flexspine.studies.tuning import Tuning, tune
+    from flexspine.studies.walk_map import WalkMap, read_walks, walk_plan
+    from flexspine.studies.walkers import Walker
     from flexspine.studies.wayfaring import Terrain, distance_to_fall
 
 _HOMES = {
@@ -85,6 +96,8 @@ _HOMES = {
     "RobotRun": "models.robot_run",
     "Run": "models.simulation",
     "Search": "gaits.search",
+    "SpaceRun": "engines.space_run",
+    "SpaceSummary": "engines.space_measures",
     "SpineComparison": "control.spine_comparison",
     "Stability": "gaits.stability",
     "Stabilizer": "control.stabilize",
@@ -92,10 +105,16 @@ _HOMES = {
     "Sweep": "studies.sweep",
     "Terrain": "studies.wayfaring",
     "Trot": "control.trot",
+    "Tuning": "studies.tuning",
+    "Walk": "control.gains",
+    "WalkMap": "studies.walk_map",
     "WalkSummary": "control.walk_measures",
+    "Walker": "studies.walkers",
     "animate": "report.animation",
     "basin_plan": "studies.basin",
     "check_pinned": "studies.pinned_check",
+    "check_replay": "studies.replay_check",
+    "check_template": "studies.template_check",
     "compare_spines": "control.spine_comparison",
     "distance_to_fall": "studies.wayfaring",
     "examine": "gaits.gait",
@@ -107,27 +126,33 @@ _HOMES = {
     "load_gait": "gaits.files",
     "load_model": "models.presets",
     "load_robot": "models.robot_file",
+    "load_walk": "control.gains",
     "map_plan": "studies.gait_map",
     "optimise": "studies.optimise",
     "plot_basin": "report.basin_figure",
     "plot_coordinates": "report.coordinates_figure",
+    "plot_engines": "report.engines_figure",
     "plot_fronts": "report.pareto_figure",
     "plot_map": "report.map_figure",
     "plot_pinned": "report.pinned_figure",
     "plot_robot": "report.robot_figure",
     "plot_robustness": "report.robustness_figure",
     "plot_run": "report.figure",
+    "plot_walks": "report.walks_figure",
     "preset_names": "models.presets",
     "read_basins": "studies.basin",
     "read_map": "studies.gait_map",
     "read_plan": "studies.plan_file",
+    "read_walks": "studies.walk_map",
     "rerun": "studies.sweep",
     "rhythm": "control.cpg",
     "robot_dataset": "models.robot_run",
     "robot_names": "models.robot_file",
+    "run_in_space": "engines.space_run",
     "save_gait": "gaits.files",
     "simulate": "models.simulation",
     "simulate_many": "models.many",
+    "space_dataset": "engines.space_dataset",
     "stabilize": "control.stabilize",
     "standing": "control.leg_function",
     "steer": "control.steering",
@@ -135,6 +160,7 @@ _HOMES = {
     "stride_map": "gaits.return_map",
     "strip": "report.animation",
     "summarize": "gaits.measures",
+    "summarize_space": "engines.space_measures",
     "summarize_walk": "control.walk_measures",
     "survive": "studies.robustness",
     "sweep": "studies.sweep",
@@ -142,6 +168,9 @@ _HOMES = {
     "to_dataset": "models.dataset",
     "trace_branch": "gaits.continuation",
     "trot": "control.trot",
+    "tune": "studies.tuning",
+    "walk_names": "control.gains",
+    "walk_plan": "studies.walk_map",
 }
 
 __all__ = [
@@ -170,6 +199,8 @@ __all__ = [
     "RobotRun",
     "Run",
     "Search",
+    "SpaceRun",
+    "SpaceSummary",
     "SpineComparison",
     "Stability",
     "Stabilizer",
@@ -177,11 +208,17 @@ __all__ = [
     "Sweep",
     "Terrain",
     "Trot",
+    "Tuning",
+    "Walk",
+    "WalkMap",
     "WalkSummary",
+    "Walker",
     "__version__",
     "animate",
     "basin_plan",
     "check_pinned",
+    "check_replay",
+    "check_template",
     "compare_spines",
     "distance_to_fall",
     "examine",
@@ -193,27 +230,33 @@ __all__ = [
     "load_gait",
     "load_model",
     "load_robot",
+    "load_walk",
     "map_plan",
     "optimise",
     "plot_basin",
     "plot_coordinates",
+    "plot_engines",
     "plot_fronts",
     "plot_map",
     "plot_pinned",
     "plot_robot",
     "plot_robustness",
     "plot_run",
+    "plot_walks",
     "preset_names",
     "read_basins",
     "read_map",
     "read_plan",
+    "read_walks",
     "rerun",
     "rhythm",
     "robot_dataset",
     "robot_names",
+    "run_in_space",
     "save_gait",
     "simulate",
     "simulate_many",
+    "space_dataset",
     "stabilize",
     "standing",
     "steer",
@@ -221,6 +264,7 @@ __all__ = [
     "stride_map",
     "strip",
     "summarize",
+    "summarize_space",
     "summarize_walk",
     "survive",
     "sweep",
@@ -228,6 +272,9 @@ __all__ = [
     "to_dataset",
     "trace_branch",
     "trot",
+    "tune",
+    "walk_names",
+    "walk_plan",
 ]
 
 

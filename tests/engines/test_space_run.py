@@ -21,7 +21,7 @@ from flexspine.engines.render import rendered
 from flexspine.engines.space_dataset import SPACE_VARIABLES, space_dataset
 from flexspine.engines.space_measures import space_record, summarize_space
 from flexspine.engines.space_run import CpgCourse, SpaceRun, run_in_space
-from flexspine.errors import MachineError, ParameterError
+from flexspine.errors import InputError, MachineError, ParameterError
 from flexspine.models.space import SpaceRobot
 from flexspine.report.film import write_film
 
@@ -196,10 +196,13 @@ def test_pictures_show_the_robot_where_there_is_opengl(tmp_path: Path) -> None:
     robot = np.ptp(first.astype(int), axis=-1) > 40
     assert 0.01 < robot.mean() < 0.4
     assert np.abs(first.astype(int) - second).mean() > 0.3
-    write_film(iter([first, second]), tmp_path / "film.gif", fps=10, count=2)
+    both = [tmp_path / "film.gif", tmp_path / "film.mp4"]
+    write_film(iter([first, second] * 5), both, fps=10, count=10)
     with Image.open(tmp_path / "film.gif") as film:
-        assert film.n_frames == 2  # type: ignore[attr-defined]
-    write_film(iter([first, second] * 5), tmp_path / "film.mp4", fps=10, count=10)
+        assert film.n_frames == 10  # type: ignore[attr-defined]
+        assert film.info["duration"] == 100
+    with pytest.raises(InputError, match=r"film\.avi"):
+        write_film(iter([first]), [tmp_path / "film.avi"], fps=10, count=1)
     assert (tmp_path / "film.mp4").stat().st_size > 500
     assert sorted(path.name for path in tmp_path.iterdir()) == ["film.gif", "film.mp4"]
 

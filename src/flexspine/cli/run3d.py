@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # What a run in space writes, in which an earlier one's pictures would pass for its own.
 PICTURES = re.compile(r"(figure|animation|film)\.(png|mp4|gif)")
 
-FILM, FILM_RATE = "film.mp4", 25
+FILMS, FILM_RATE = ("film.mp4", "film.gif"), 25
 
 OF_WALKS = ("gait.", "servo.")
 
@@ -158,10 +158,11 @@ def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:
     from flexspine.engines.render import rendered
     from flexspine.report.film import write_film
 
-    progress.begin(f"filming {FILM}")
+    progress.begin("filming")
     times = np.arange(0, run.duration, 1 / FILM_RATE)
     pictures = rendered(run, times)
-    write_film(pictures, stage / FILM, fps=FILM_RATE, count=len(times), progress=progress.at)
+    places = [stage / name for name in FILMS]
+    write_film(pictures, places, fps=FILM_RATE, count=len(times), progress=progress.at)
 
 
 def _report(run: SpaceRun, summary: SpaceSummary) -> str:

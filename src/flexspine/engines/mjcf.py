@@ -179,11 +179,13 @@ def _add_body(mujoco: Any, parent: Any, space: SpaceRobot, part: Part, start: St
         # Forces may have quadratic and cubic parts there; ours are linear.
         joint.stiffness, joint.damping = [hinge.stiffness, 0, 0], [hinge.damping, 0, 0]
         joint.springref = hinge.rest
+    # Shanks end in the middle of their feet.
+    shown = part.length - sum(ball.radius for ball in space.balls if ball.part == part.name)
     body.add_geom(
         name=part.name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[part.length / 2, part.width / 2, part.height / 2],
-        pos=[part.length / 2, 0, 0],
+        size=[shown / 2, part.width / 2, part.height / 2],
+        pos=[shown / 2, 0, 0],
         rgba=COLORS["trunk" if part.name in space.trunk else "leg"],
         contype=0,
         conaffinity=0,

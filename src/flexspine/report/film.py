@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from PIL import Image
@@ -14,74 +14,108 @@ from flexspine.errors import InputError, MachineError, OutputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Picture = NDArray[np.uint8]
+
+# Hz; a GIF counts time in hundredths of a second and is large: it takes every second picture of
+# faster films.
+GIF_RATE = 13
+
+
+class _Film(Protocol):
+    """A film that is being made."""
+
+    def add(self, picture: Picture) -> None:
+        """Add a picture."""
+
+    def close(self) -> None:
+        """Finish the file."""
+
 
 def write_film(
-    pictures: Iterable[NDArray[np.uint8]],
-    path: Path,
+    pictures: Iterable[Picture],
+    paths: Sequence[Path],
     *,
     fps: int,
     count: int,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Write pictures of shape (height, width, 3) as a GIF or an MP4, by the suffix of ``path``.
+    """Write pictures of shape (height, width, 3) to files, GIF or MP4 by their suffixes.
 
     ``progress`` is told which share of ``count`` is done. Raises `InputError`, among them
     `OutputError` for a path that cannot be written to, and `MachineError` where the video encoder
     fails; whatever raises leaves no file behind.
     """
-    suffix = path.suffix.lower()
-    if suffix not in (".gif", ".mp4"):
-        raise InputError(f"cannot write a film as '{path.name}'", "name it .gif or .mp4")
-    part = path.with_name(f".{path.stem}.part{suffix}")
-
-    def told() -> Iterable[NDArray[np.uint8]]:
+    makers: dict[str, Callable[[Path, int], _Film]] = {".gif": _Gif, ".mp4": _Video}
+    for path in paths:
+        if path.suffix.lower() not in makers:
+            raise InputError(f"cannot write a film as '{path.name}'", "name it .gif or .mp4")
+    parts = {path: path.with_name(f".{path.stem}.part{path.suffix.lower()}") for path in paths}
+    try:
+        films = [makers[part.suffix](part, fps) for part in parts.values()]
         for number, picture in enumerate(pictures, start=1):
-            yield picture
+            for film in films:
+                film.add(picture)
             if progress is not None:
                 progress(number / count)
-
-    try:
-        (_write_gif if suffix == ".gif" else _write_video)(told(), part, fps)
-        part.replace(path)
+        for film in films:
+            film.close()
+        for path, part in parts.items():
+            part.replace(path)
     except OSError as failure:
         raise OutputError(
-            f"cannot write '{path}' ({failure.strerror or failure})",
+            f"cannot write '{paths[0].parent}' ({failure.strerror or failure})",
             "give a place that can be written to",
         ) from failure
     finally:
-        if part.parent.is_dir():
-            part.unlink(missing_ok=True)
+        for part in parts.values():
+            if part.parent.is_dir():
+                part.unlink(missing_ok=True)
 
 
-def _write_gif(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: int) -> None:
-    frames: list[Image.Image] = []
-    for picture in pictures:
-        # The colours of the first picture will do for all of them.
+class _Gif:
+    def __init__(self, path: Path, fps: int) -> None:
+        self._path, self._every = path, 2 if fps > GIF_RATE else 1
+        self._duration = round(1000 * self._every / fps)  # ms
+        self._frames: list[Image.Image] = []
+        self._seen = 0
+
+    def add(self, picture: Picture) -> None:
+        self._seen += 1
+        if (self._seen - 1) % self._every:
+            return
         image = Image.fromarray(picture)
-        frames.append(
-            image.quantize(palette=frames[0], dither=Image.Dither.NONE)
-            if frames
-            else image.quantize(256)
-        )
-    duration = round(1000 / fps)  # ms
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=duration, loop=0)
+        if not self._frames:
+            self._frames.append(image.quantize(256))
+            return
+        # The colours of the first picture will do for all of them.
+        frame = image.quantize(palette=self._frames[0], dither=Image.Dither.NONE)
+        self._frames.append(frame)
+
+    def close(self) -> None:
+        first, *others = self._frames
+        first.save(self._path, save_all=True, append_images=others, duration=self._duration, loop=0)
 
 
-def _write_video(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: int) -> None:
-    import imageio_ffmpeg
+class _Video:
+    def __init__(self, path: Path, fps: int) -> None:
+        self._path, self._fps = path, fps
+        self._writer: Any = None
 
-    writer = None
-    try:
-        for picture in pictures:
-            if writer is None:
+    def add(self, picture: Picture) -> None:
+        import imageio_ffmpeg
+
+        try:
+            if self._writer is None:
                 size = picture.shape[1], picture.shape[0]
-                writer = imageio_ffmpeg.write_frames(
-                    str(path), size, fps=fps, codec="libx264", quality=7, macro_block_size=2
-                )
-                writer.send(None)
-            writer.send(np.ascontiguousarray(picture))
-    except RuntimeError as failure:
-        raise MachineError("the video encoder failed", "write a .gif instead") from failure
-    finally:
-        if writer is not None:
-            writer.close()
+                self._writer = imageio_ffmpeg.write_frames(
+                    str(self._path), size, fps=self._fps, codec="libx264", quality=7,
+                    macro_block_size=2,
+                )  # fmt: skip
+                self._writer.send(None)
+            self._writer.send(np.ascontiguousarray(picture))
+        except RuntimeError as failure:
+            raise MachineError("the video encoder failed", "run it again") from failure
+
+    def close(self) -> None:
+        if self._writer is not None:
+            self._writer.close()
