@@ -183,11 +183,13 @@ def _encoder() -> dict[str, Any]:
 
 
 def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
-    """Draw ``frames`` evenly spaced postures over the last apex-to-apex cycle, else the run.
+    """Draw ``frames`` evenly spaced postures over the last stride from apex to apex, or the run.
 
-    They stand side by side; the way between them is not drawn. Raises `InputError`.
+    Of a run that ended early they lead up to its end. They stand side by side; the way between them
+    is not drawn. Raises `InputError`.
     """
     check_samples(dataset)
+    dataset = drawable(dataset)
     if not 1 <= frames <= MAX_POSTURES:
         raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
     shown = postures(dataset, np.linspace(*last_cycle(dataset), frames))
