@@ -158,7 +158,7 @@ def draw_phase_bar(axes: Axes, spans: list[Span], limits: tuple[float, float]) -
 def label_phases(axes: Axes, spans: list[Span], width: float) -> None:
     """Write the names into a bar that is ``width`` inches wide, where they fit."""
     left, right = axes.get_xlim()
-    room = 2.2 * SMALL_SIZE / 72  # in; two letters and some air
+    room = 1.6 * SMALL_SIZE / 72  # in; two letters
     for span in spans:
         start, end = max(span.start, left), min(span.end, right)
         if (end - start) / (right - left) * width > room:
