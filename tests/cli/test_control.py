@@ -42,9 +42,33 @@ def test_control_bounds_with_noise_and_writes_what_it_did(cli: Cli, tmp_path: Pa
         time = float(table[8]["time"])
         assert float(data["time"][-1]) == pytest.approx(time, abs=1e-12)
         assert float(data["com_y"][-1]) == pytest.approx(float(table[8]["height"]), abs=1e-9)
+    shown = record.pop("shown")
+    assert shown["strides"] == [1, 8]
+    assert shown["end"] == pytest.approx(float(table[8]["time"]))
     assert json.loads(cli(*asked, "--json").stdout) == record
     other = json.loads(cli(*asked[:-1], "4", "--json").stdout)
     assert other["distance"] != record["distance"]
+
+
+def test_of_a_run_that_falls_the_last_strides_are_kept_and_it_is_told(
+    cli: Cli, tmp_path: Path
+) -> None:
+    asked = ("control", "--acting", "0.03", "--seed", "2")
+    done = cli(*asked, "--out", "here", "--no-animation")
+    assert done.returncode == 1
+    assert "fell" in done.stdout
+    table = rows(tmp_path / "here" / "apexes.csv")
+    made = len(table) - 1
+    assert made > 8
+    assert f"the last 8 of {made} strides and the end" in done.stdout
+    with xr.open_dataset(tmp_path / "here" / "trajectory.nc") as data:
+        assert data.attrs["outcome"] == "fell"
+        assert float(data["time"][0]) == pytest.approx(float(table[-9]["time"]), abs=1e-12)
+        assert float(data["com_y"][0]) == pytest.approx(float(table[-9]["height"]), abs=1e-12)
+        hips = [float(data[f"{side}_hip_y"][-1]) for side in ("fore", "hind")]
+        assert min(hips) == pytest.approx(0.0, abs=1e-9), "the fall is there"
+        assert f"of {made} strides" in data.attrs["shown"]
+    assert f"of {made} strides" not in cli(*asked).stdout, "nothing is shown"
 
 
 def test_control_without_noise_stays_where_it_is(cli: Cli) -> None:
@@ -111,7 +135,10 @@ def test_terrain_shows_a_run_and_tells_of_many(cli: Cli, tmp_path: Path) -> None
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
     record = json.loads(done.stdout)
-    assert record["ground"] == "rough ground of 0.006 m, seed 2"
+    assert record["ground"] == "rough ground of 0.006 m, 0.3 m apart, seed 2"
+    assert record["terrain"] == {"kind": "rough", "numbers": {"height": 0.006, "spacing": 0.3}}
+    assert record["shown"]["strides"] == [1, 2]
+    assert record["shown"]["told"] is None, "it is the whole"
     many = record["ensemble"]
     assert many["runs"] == sum(many["outcomes"].values()) == 30
     folder = tmp_path / "here"
@@ -120,6 +147,7 @@ def test_terrain_shows_a_run_and_tells_of_many(cli: Cli, tmp_path: Path) -> None
     arrived = [row for row in table if row["outcome"] == "completed"]
     assert len(arrived) == many["arrived"]
     assert float(table[0]["distance"]) == pytest.approx(record["distance"])
+    assert len(rows(folder / "apexes.csv")) == 3
     ground = rows(folder / "ground.csv")
     heights = np.array([float(row["y"]) for row in ground])
     assert 0.003 < np.abs(heights).max() <= 0.006

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from flexspine.errors import InputError
 from flexspine.report.damping_figure import HIGHEST, plot_damping
+from flexspine.report.style import YELLOW
 from tests.report.layout import assert_no_text_overlaps
 
 Row = dict[str, Any]
@@ -99,11 +103,35 @@ def test_gaits_on_the_brink_leave_the_panel_of_stability(figure: Figure) -> None
     assert figure.axes[11].get_ylim()[0] < 0.9
 
 
+def test_a_single_stable_gait_is_highlighted_in_every_panel(figure: Figure) -> None:
+    """At 160 N m/rad; the radius is 1 at 100 + 60 * 49 / 49.1 and 160 + 340 * 0.1 / 1.1 N m/rad."""
+    for axes in figure.axes:
+        stable = [
+            line
+            for line in axes.lines
+            if to_hex(line.get_color()) == YELLOW.lower() and len(line.get_xdata()) > 1
+        ]
+        assert len(stable) == (3 if axes in figure.axes[2::3] else 0)
+        for line in stable:
+            found = np.array(line.get_xdata(), dtype=float)
+            assert found[np.isfinite(found)] == pytest.approx([159.877801, 160.0, 190.909091])
+
+
+def test_colours_of_actuators_and_of_speeds_are_far_apart(figure: Figure) -> None:
+    actuators, speeds = (
+        [to_rgb(line.get_color()) for line in axes.lines if len(line.get_xdata()) > 1]
+        for axes in figure.axes[:2]
+    )
+    assert (len(actuators), len(speeds)) == (3, 2)
+    for one, other in product(actuators, speeds):
+        assert np.hypot.reduce(np.subtract(one, other)) > 0.3
+
+
 def test_the_key_says_what_actuators_come_to_at_most(figure: Figure) -> None:
     key = [text.get_text() for text in figure.legends[0].get_texts()]
     for told in (
         "leg extension, at most 5 mm", "leg stiffening, at most 12 %", "hip lever, at most 8.6 mm",
-        "4 m/s", "4.5 m/s", "$c_t$ = 0.1 N m s/rad", "$c_t$ = 1 N m s/rad", "thick: stable",
+        "4 m/s", "4.5 m/s", "$c_t$ = 0.1 N m s/rad", "$c_t$ = 1 N m s/rad", "highlighted: stable",
     ):  # fmt: skip
         assert told in key
     assert_no_text_overlaps(figure)

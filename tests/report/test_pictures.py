@@ -7,10 +7,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 from PIL import Image
 
-from flexspine import Model, animate, load_model, plot_run, simulate, strip, to_dataset
+from flexspine import (
+    Model,
+    Terrain,
+    animate,
+    examine,
+    load_model,
+    plot_run,
+    simulate,
+    stabilize,
+    strip,
+    to_dataset,
+)
+from flexspine.control.excerpt import excerpt
 from flexspine.errors import InputError
+from flexspine.report.caption import describe
+from flexspine.report.stage import draw_ground
+from flexspine.report.stick_figure import Scale
+from flexspine.report.way import Way
+from flexspine.studies.wayfaring import walk_over
 from tests.report.layout import assert_no_text_overlaps
 
 
@@ -95,3 +113,84 @@ def test_energy_of_an_actuated_run_adds_up_to_what_it_had_and_was_given(flexible
     whole = data["total_energy"].values + data["dissipated_energy"].values
     assert np.asarray(given.get_ydata()) == pytest.approx(100 * whole / whole[0], rel=1e-9)
     assert whole[-1] > 1.02 * whole[0]
+
+
+@pytest.fixture(scope="module")
+def rough() -> xr.Dataset:
+    """Steered over rough ground, until energy has risen by half."""
+    gait = examine(load_model("kamimura2015-flexible"))
+    inputs = ("touchdown.fore", "touchdown.hind", "legs.extension")
+    feedback = stabilize(gait, inputs, twice=True)
+    terrain = Terrain("rough", {"height": 0.03, "spacing": 0.4})
+    return to_dataset(
+        excerpt(
+            walk_over(gait.model, feedback, terrain, stride=gait.stride_length, strides=5, seed=8),
+            most=4,
+        )
+    )
+
+
+def test_the_ground_is_drawn_below_the_com(rough: xr.Dataset) -> None:
+    height = plot_run(rough).axes[1]
+    com, ground = (np.asarray(line.get_ydata()) for line in height.lines[:2])
+    assert np.all(ground < com)
+    told = [text.get_text() for text in height.get_legend().get_texts()]
+    (raised,) = [float(text.split()[-2]) for text in told if "raised by" in text]
+    x = rough["com_x"].values
+    assert ground - raised == pytest.approx(
+        np.interp(x, rough["ground_x"].values, rough["ground_y"].values)
+    )
+
+
+def test_the_key_fits_and_all_energy_is_on_the_scale(rough: xr.Dataset) -> None:
+    crowded = rough.assign(event_kind=rough["event_kind"].copy())
+    kinds = crowded["event_kind"].values.astype("U60")
+    kinds[np.array(["compression" in kind for kind in kinds])] = "an event with a name of its own"
+    for data in (rough, crowded.assign(event_kind=("event", kinds))):
+        figure = plot_run(data)
+        (key,) = figure.legends
+        assert key.get_window_extent().x1 <= figure.bbox.x1
+        told = " ".join(text.get_text() for text in key.get_texts())
+        assert "DS: both legs in stance" in told
+        energy = next(axes for axes in figure.axes if "energy" in axes.get_ylabel())
+        assert energy.get_ylim()[1] > 140
+        assert max(energy.get_yticks()) >= 0.95 * energy.get_ylim()[1]
+    assert "fore greatest compression" not in told
+
+
+def test_an_excerpt_says_what_it_shows(rough: xr.Dataset) -> None:
+    for figure in (plot_run(rough), strip(rough)):
+        assert "the first 4 of 5 strides" in " ".join(text.get_text() for text in figure.texts)
+
+
+def test_hatching_of_the_ground_stays_on_it(rough: xr.Dataset) -> None:
+    """In the axes, where none moves the clip, and between the ends of the ground."""
+    axes = Figure().subplots()
+    axes.set_xlim(1.0, 2.0)
+    draw_ground(axes, (0.5, 2.5), Scale.of(rough), Way.of(rough))
+    (strokes,) = axes.collections
+    ends = np.vstack(strokes.get_segments())[:, 0]
+    assert (ends.min(), ends.max()) == pytest.approx((0.5, 2.5), abs=0.1)
+    assert 0.5 <= ends.min() < ends.max() <= 2.5
+    assert strokes.get_clip_on()
+    assert strokes.get_clip_path() is None
+    assert strokes.get_clip_box() is not None
+
+
+def test_actuators_that_work_are_named(flexible: Model) -> None:
+    given = {"legs.extension": 0.00217, "hind.leg.stiffening": 0.05, "spine.damping": 1.0}
+    data = to_dataset(simulate(flexible.with_values(given)))
+    told = "  ·  ".join(describe(data))
+    assert "leg extension 2.17 mm" in told
+    assert "leg stiffening 0 (fore), 5 (hind) %" in told
+    assert "hip lever" not in told
+    assert "extension" not in " ".join(describe(to_dataset(simulate(flexible))))
+
+
+def test_energy_of_an_excerpt_counts_from_its_first_instant(rough: xr.Dataset) -> None:
+    late = rough.sel(time=slice(0.8, None))
+    lines = [line for axes in plot_run(late).axes for line in axes.get_lines()]
+    (given,) = [line for line in lines if line.get_label() == "start and work"]
+    total = late["total_energy"].values
+    assert np.asarray(given.get_ydata()) == pytest.approx(100 * total / total[0], rel=1e-9)
+    assert total[-1] > 1.2 * total[0]

@@ -21,9 +21,6 @@ from flexspine.cli.output import print_json, steps
 from flexspine.cli.starts import starting_gait
 from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
 
-# Strides from the start that are recorded with --out.
-SHOWN = 8
-
 # Spectral radii that differ by less are the same.
 ON_LEVEL = 1e-6
 
@@ -57,9 +54,10 @@ def control(
     """Stabilise a gait by feedback at its apexes, and run it with noise or after a push.
 
     The feedback is linear, designed on the exact derivative of the stride. Touchdown angles cannot
-    change the energy of a passive animal; thrust such as legs.extension can. Units are SI and
-    radians. Exit code 0: all strides done; 1: it fell, or nothing makes it stable; 2: bad input;
-    3: the machine failed; 130: interrupted.
+    change the energy of a passive animal; thrust such as legs.extension can. With --out the first
+    8 strides are kept in full and drawn, of a run that ended early the last 8; apexes.csv has all.
+    Units are SI and radians. Exit code 0: all strides done; 1: it fell, or nothing makes it
+    stable; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine control --acting 0.01 --uniform --out results
@@ -69,6 +67,7 @@ def control(
         flexspine control --gait results/gait-1.json --push 3 --strides 100 --json
     """
     from flexspine.cli.results import ResultDirectory
+    from flexspine.control.excerpt import excerpt
     from flexspine.control.steered_record import apex_table, steered_record
     from flexspine.control.steering import Noise
     from flexspine.control.steering import steer as run_steered
@@ -94,11 +93,9 @@ def control(
             from flexspine.report.control_figure import plot_control
             from flexspine.studies.tables import write_table
 
-            table = apex_table(run, start)
-            first = run_steered(
-                model, found, strides=min(strides, SHOWN), noise=noise, seed=seed, record=True
-            )
-            with directory.stage_run(first, record, animation, progress) as stage:
+            table, part = apex_table(run, start), excerpt(run)
+            record["shown"] = part.record
+            with directory.stage_run(part, record, animation, progress) as stage:
                 write_table(table, stage / "apexes.csv")
                 plot_control(record, table).savefig(stage / "control.png")
     if json:
@@ -124,6 +121,8 @@ def report(record: dict[str, Any]) -> str:
     lines.append(_energy(record))
     if record["outcome"] != "completed":
         lines.append(f"  advice           {record['advice']}")
+    if record.get("shown", {}).get("told"):
+        lines.append(f"  shown            {record['shown']['told']}")
     return "\n".join(lines)
 
 

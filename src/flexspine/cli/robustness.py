@@ -187,7 +187,7 @@ def _write(stage: Path, found: Robustness, record: dict[str, Any]) -> None:
         for number, (size, fate) in enumerate(zip(each.sizes.tolist(), each.fates, strict=True))
     ]
     write_table(rows, stage / f"{name}.parquet")
-    plot_robustness(found).savefig(stage / f"{name}.png")
+    plot_robustness(found, record["animals"]).savefig(stage / f"{name}.png")
 
 
 def _report(record: dict[str, Any]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,9 +31,6 @@ if TYPE_CHECKING:
     from flexspine.control.steering import SteeredRun, Steering
     from flexspine.gaits.gait import Gait
     from flexspine.studies.wayfaring import Wayfaring
-
-# No more strides than this are recorded with --out: gigabytes, and nobody looks at them.
-RECORDED = 200
 
 
 def terrain(
@@ -81,10 +77,11 @@ def terrain(
 
     The feedback is that of 'flexspine control'; heights are measured from the ground below the
     CoM. Legs keep their length in the air, so that whether a toe clears a face depends on where in
-    the stride it stands. With --runs, distances to the first fall are told; interrupted, the same
-    command goes on. Units are SI and radians but for a slope's degrees. Exit code 0: all strides
-    done, or all of --runs; 1: it fell or stumbled; 2: bad input; 3: the machine failed;
-    130: interrupted.
+    the stride it stands. With --out the first 8 strides are kept in full and drawn, of a run that
+    ended early the last 8; apexes.csv has all. With --runs, distances to the first fall are told;
+    interrupted, the same command goes on. Units are SI and radians but for a slope's degrees. Exit
+    code 0: all strides done, or all of --runs; 1: it fell or stumbled; 2: bad input; 3: the machine
+    failed; 130: interrupted.
 
     Examples:
         flexspine terrain rough --with height=0.008 --out results
@@ -94,6 +91,7 @@ def terrain(
         flexspine terrain waves --with amplitude=0.01 --with wavelength=2 --runs 200 --out results
     """
     from flexspine.cli.results import ResultDirectory
+    from flexspine.control.excerpt import excerpt
     from flexspine.control.steered_record import steered_record
     from flexspine.studies.wayfaring import Terrain, distance_to_fall, walk_over
 
@@ -113,9 +111,14 @@ def terrain(
             found = steering = stabilizer_of(start, steer, method, once, effort)
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         progress.begin("running")
-        over = partial(walk_over, start.model, steering, where, stride=start.stride_length)
-        run = over(strides=strides, seed=seed)
-        record = {**steered_record(run, start, found), "passive": passive}
+        run = walk_over(
+            start.model, steering, where, stride=start.stride_length, strides=strides, seed=seed
+        )
+        record = {
+            **steered_record(run, start, found),
+            "terrain": {"kind": kind, "numbers": where.all_numbers},
+            "passive": passive,
+        }
         if runs > 1:
             store = stack.enter_context(kept(out, "terrain"))
             with counting("runs") as count:
@@ -126,10 +129,10 @@ def terrain(
                 )  # fmt: skip
             record["ensemble"] = _ensemble_record(ensemble)
         if directory is not None:
-            record["recorded_strides"] = min(strides, RECORDED)
-            first = over(strides=record["recorded_strides"], seed=seed, record=True)
-            with directory.stage_run(first, record, animation, progress) as stage:
-                _write_ground(run, stage)
+            part = excerpt(run)
+            record["shown"] = part.record
+            with directory.stage_run(part, record, animation, progress) as stage:
+                _write_way(run, start, stage)
                 if runs > 1:
                     _write_ensemble(ensemble, record, stage)
     if json:
@@ -162,10 +165,13 @@ def _ensemble_record(found: Wayfaring) -> dict[str, Any]:
     }
 
 
-def _write_ground(run: SteeredRun, stage: Path) -> None:
+def _write_way(run: SteeredRun, gait: Gait, stage: Path) -> None:
+    """All apexes of a run, and the ground that it passed over."""
+    from flexspine.control.steered_record import apex_table
     from flexspine.models.dataset import VICINITY
     from flexspine.studies.tables import write_table
 
+    write_table(apex_table(run, gait), stage / "apexes.csv")
     assert run.model.ground is not None
     ends = [float(point.states[0]) for point in (run.trajectory.start, run.trajectory.end)]
     outline = run.model.ground.outline(min(ends) - VICINITY, max(ends) + VICINITY)

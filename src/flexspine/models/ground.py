@@ -170,7 +170,8 @@ class Ground:
             raise ParameterError(f"count = {count:g} of steps is not usable", "give a whole number")
         faces = range(int(count))
         points = [(at + length * k, height * (k + up)) for k in faces for up in (0, 1)]
-        return cls(f"{int(count)} steps of {height:g} m", tuple(points))
+        name = f"{int(count)} steps of {height:g} m, {length:g} m apart"
+        return cls(name, tuple(points))
 
     @classmethod
     def ramp(cls, height: float, length: float = 1.0, at: float = BEGINS) -> Ground:
@@ -205,7 +206,8 @@ class Ground:
         """Lines between heights drawn from -``height`` to ``height`` m, ``spacing`` m apart."""
         heights = _drawn(height, spacing, length, seed)
         points = [(at, 0.0), *((at + spacing * (k + 1), y) for k, y in enumerate(heights))]
-        return cls(f"rough ground of {height:g} m, seed {seed}", tuple(points))
+        name = f"rough ground of {height:g} m, {spacing:g} m apart, seed {seed}"
+        return cls(name, tuple(points))
 
     @classmethod
     def blocks(
@@ -221,7 +223,8 @@ class Ground:
         for k, y in enumerate(_drawn(height, spacing, length, seed)):
             points += [(at + spacing * k, before), (at + spacing * k, y)]
             before = y
-        return cls(f"blocks of {height:g} m, seed {seed}", tuple(points))
+        name = f"blocks of {height:g} m, {spacing:g} m long, seed {seed}"
+        return cls(name, tuple(points))
 
     @classmethod
     def read(cls, path: str | Path) -> Ground:

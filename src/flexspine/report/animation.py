@@ -23,7 +23,7 @@ from flexspine.report.scene import Scene, pill, view_of
 from flexspine.report.stage import DOTS, View, add_force_key, draw_ground, draw_heights, write
 from flexspine.report.stick_figure import Scale, StickFigure, bend_palette
 from flexspine.report.style import SMALL_SIZE, TITLE_SIZE, themed
-from flexspine.report.timeline import check_samples, drawable, is_robot, last_cycle
+from flexspine.report.timeline import check_samples, drawable, is_robot, last_cycle, stride_times
 from flexspine.report.way import Way
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ MAX_POSTURES = 40
 PER_ROW = 5
 CELL = 1.9  # in, the width of one posture
 LABELS = 0.4  # in, below each row
+LETTERS = 125  # of small type; what fits over five postures
 
 
 class Shown(Protocol):
@@ -183,11 +184,13 @@ def _encoder() -> dict[str, Any]:
 
 
 def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
-    """Draw ``frames`` evenly spaced postures over the last apex-to-apex cycle, else the run.
+    """Draw ``frames`` evenly spaced postures over the last stride from apex to apex, or the run.
 
-    They stand side by side; the way between them is not drawn. Raises `InputError`.
+    Of a run that ended early they lead up to its end. They stand side by side; the way between them
+    is not drawn. Raises `InputError`.
     """
     check_samples(dataset)
+    dataset = drawable(dataset)
     if not 1 <= frames <= MAX_POSTURES:
         raise ParameterError(f"frames = {frames} is not usable", f"give 1 to {MAX_POSTURES}")
     shown = postures(dataset, np.linspace(*last_cycle(dataset), frames))
@@ -242,13 +245,21 @@ def _draw_row(
 
 def _write_heading(figure: Figure, dataset: xr.Dataset, shown: list[Posture]) -> None:
     width, height = figure.get_size_inches()
-    early = ending(dataset)
+    under = [line for line in (_stretch(dataset), ending(dataset)) if line]
     write(figure, (0.12, height - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
-    if early:
-        write(figure, (0.12, height - 0.4), shorten(early, 90))
+    write(figure, (0.12, height - 0.4), shorten("  ·  ".join(under), LETTERS))
     if len(shown) == 1:
         return
     moved = shown[-1].com[0] - shown[0].com[0]
     lasted = shown[-1].time - shown[0].time
     told = f"side by side; from first to last {moved:.3g} m in {lasted:.3g} s"
     write(figure, (width - 0.15, 0.2), told, ha="right")
+
+
+def _stretch(dataset: xr.Dataset) -> str | None:
+    """Which part of what the postures are, or None for all of it."""
+    early, strides = ending(dataset), len(stride_times(dataset)) - 1
+    if strides < 1 or (strides == 1 and not early):
+        return None
+    whole = f"{strides} stride{'s' * (strides != 1)}{' and the end' if early else ''}"
+    return f"the last {'stretch ' if early else ''}of {dataset.attrs.get('shown', whole)}"

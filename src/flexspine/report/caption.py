@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,17 @@ CONTROLLERS = {
 # What a run under feedback has to say.
 REMARKS = ("steered", "noise on what is steered", "noise on the apex")
 
+# What an actuator is called, its factor and unit.
+THRUST = {
+    "extension": ("extension", 1000.0, "mm"),
+    "stiffening": ("stiffening", 100.0, "%"),
+    "hip_lever": ("hip lever", 1000.0, "mm"),
+}
+SHIFTS = {
+    "spine.stiffness_shift.": ("spine stiffness", 100.0, "%"),
+    "spine.rest_shift.": ("spine rest angle", 180 / pi, "°"),
+}
+
 WIDE = 115  # letters in a line of small type over a robot's pictures
 LONGEST_NAME = 60  # letters; what fits into a line of a title
 
@@ -40,6 +52,7 @@ def describe(dataset: xr.Dataset) -> list[str]:
     parts += of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
     if any(given.get(f"{side}.leg.damping") for side in SIDES):
         parts += of_legs(given, "damping $c_l$", "damping", "N s/m per leg pair")
+    parts += _of_actuators(given)
     angles = json.loads(dataset.attrs.get("touchdown_angles", "{}"))
     told = [name for name in REMARKS if name in dataset.attrs]
     if told:
@@ -47,7 +60,8 @@ def describe(dataset: xr.Dataset) -> list[str]:
     elif angles:
         both = ", ".join(f"{side} {np.degrees(angle):.1f}°" for side, angle in angles.items())
         parts.append(f"touchdown angles: {both}")
-    parts.append(f"energy at the start {float(dataset['total_energy'][0]):.4g} J")
+    began, energy = float(dataset["time"][0]), float(dataset["total_energy"][0])
+    parts.append(f"energy {energy:.4g} J at {f'{began:.2f} s' if began else 'the start'}")
     return joined(parts + _mean_speed(dataset)) + _changed(dataset)
 
 
@@ -57,6 +71,25 @@ def _of_spine(given: dict[str, Any]) -> list[str]:
     parts = [f"spine stiffness $k_t$ = {given['spine.stiffness']:g} N m/rad"]
     if given.get("spine.damping"):
         parts.append(f"spine damping $c_t$ = {given['spine.damping']:g} N m s/rad")
+    return parts
+
+
+def _of_actuators(given: dict[str, Any]) -> list[str]:
+    """All that is not zero of what puts energy in."""
+    parts = []
+    for name, (label, factor, unit) in THRUST.items():
+        both = given.get(f"legs.{name}", 0.0)
+        fore, hind = (factor * (given.get(f"{side}.leg.{name}", 0.0) + both) for side in SIDES)
+        if fore or hind:
+            told = f"{fore:.3g}" if fore == hind else f"{fore:.3g} (fore), {hind:.3g} (hind)"
+            parts.append(f"leg {label} {told} {unit}")
+    for name, (label, factor, unit) in SHIFTS.items():
+        shifts = {key: value for key, value in given.items() if key.startswith(name) and value}
+        if shifts:
+            told = ", ".join(
+                f"{key.rpartition('.')[2]} {factor * value:+.3g}" for key, value in shifts.items()
+            )
+            parts.append(f"{label} by phase: {told} {unit}")
     return parts
 
 
@@ -130,6 +163,11 @@ def heading(dataset: xr.Dataset) -> str:
     if is_robot(dataset):
         name = attrs.get("title", "run of a robot")
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
+
+
+def excerpt_of(dataset: xr.Dataset) -> list[str]:
+    """Return which part of a longer run is shown, nothing for all of it."""
+    return [f"shown: {dataset.attrs['shown']}"] if "shown" in dataset.attrs else []
 
 
 def ending(dataset: xr.Dataset) -> str | None:

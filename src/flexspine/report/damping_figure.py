@@ -19,12 +19,10 @@ from flexspine.report.study_figures import (
     LEG_STIFFNESS,
     LIMIT,
     LIMIT_NAME,
-    STABLE,
-    STABLE_NAME,
     setting_of,
 )
 from flexspine.report.study_profiles import GRID, ramp, start_figure
-from flexspine.report.style import FAINT, GREEN, INK, PURPLE, SKY, themed
+from flexspine.report.style import INK, ORANGE, PURPLE, SKY, YELLOW, themed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +33,15 @@ if TYPE_CHECKING:
 
 DAMPING, STIFFNESS, MODEL = "spine.damping", "spine.stiffness", "flexible-bounder"
 
-COLORS = (GREEN, PURPLE, SKY)
+# Of actuators; none of them is like those of speeds.
+COLORS = (ORANGE, PURPLE, SKY)
+
+# Round marks too: of a short stretch there may be one gait only.
+STABLE: dict[str, Any] = {
+    "color": YELLOW, "linewidth": 9.0, "marker": "o", "markersize": 9.0, "markeredgewidth": 0.0,
+    "solid_capstyle": "butt", "zorder": 1.8,
+}  # fmt: skip
+STABLE_NAME = "highlighted: stable"
 
 # Of dampings, least first.
 DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)))
@@ -207,7 +213,7 @@ def _key(
     for line in stiffnesses:
         key[f"$c_t$ = {line.damping:g} N m s/rad"] = {"color": INK, "linestyle": line.dashes}
     if any(row["stable"] for line in (*actuators, *speeds, *stiffnesses) for row in line.rows):
-        key[STABLE_NAME] = {"color": FAINT, **STABLE}
+        key[STABLE_NAME] = {**STABLE, "marker": None}
     return {**key, LIMIT_NAME: LIMIT, END_NAME: {**END, "markeredgecolor": INK}}
 
 
@@ -222,9 +228,7 @@ def _draw(axes: Axes, column: list[Line], measure: Measure) -> None:
         axes.plot(along, values, color=line.color, linestyle=line.dashes)
         for at in (0, -1):
             axes.plot([along[at]], [values[at]], **END, markeredgecolor=line.color)
-        if measure is RADIUS:
-            steady = [v if row["stable"] else nan for v, row in zip(values, line.rows, strict=True)]
-            axes.plot(along, steady, color=line.color, **STABLE)
+        axes.plot(*_steady(line, along, values), **STABLE)
         drawn += [value for value in values if isfinite(value)]
     if measure is RADIUS and max(drawn) > HIGHEST:
         drawn = [value for value in drawn if value < HIGHEST]
@@ -235,6 +239,24 @@ def _draw(axes: Axes, column: list[Line], measure: Measure) -> None:
         _label(axes.yaxis)
     else:
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+
+
+def _steady(line: Line, along: list[float], values: list[float]) -> list[list[float]]:
+    """The stable stretches of a curve, NaN between them, up to where the spectral radius is 1."""
+    radii, found = line.of("spectral_radius"), [[nan], [nan]]
+    for at, row in enumerate(line.rows):
+        before = at and line.rows[at - 1]["stable"]
+        if at and bool(row["stable"]) != bool(before):
+            inner, outer = (at - 1, at) if before else (at, at - 1)
+            share = (1 - radii[inner]) / ((radii[outer] - radii[inner]) or nan)
+            share = share if 0 < share < 1 else 0.0
+            for column, known in zip(found, (along, values), strict=True):
+                end = known[inner] + share * (known[outer] - known[inner])
+                column += [end, nan] if before else [end]
+        if row["stable"]:
+            found[0].append(along[at])
+            found[1].append(values[at])
+    return found
 
 
 def _label(axis: XAxis | YAxis) -> None:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from flexspine.report.caption import joined
 from flexspine.report.style import BLUE, FAINT, INK, LINE, SMALL_SIZE, add_title, themed
+from flexspine.studies.wayfaring import NO_LENGTHS
 
 if TYPE_CHECKING:
     from flexspine.studies.wayfaring import Wayfaring
@@ -51,7 +52,8 @@ def _heading(found: Wayfaring, record: Mapping[str, Any]) -> str:
 
 
 def _details(found: Wayfaring, record: Mapping[str, Any]) -> list[str]:
-    parts = [f"{name} {value:g}" for name, value in found.terrain.numbers.items()]
+    numbers = found.terrain.all_numbers
+    parts = [f"{n} {value:g}{'' if n in NO_LENGTHS else ' m'}" for n, value in numbers.items()]
     how = (
         "fixed touchdown angles" if record["passive"] else f"steered: {', '.join(record['inputs'])}"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import zip_longest
+from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from flexspine.report.caption import SIDES, describe, ending, heading
+from flexspine.report.caption import SIDES, describe, ending, excerpt_of, heading
 from flexspine.report.style import (
     ENERGY_COLORS,
     FAINT,
@@ -36,16 +36,24 @@ from flexspine.report.timeline import (
     phase_spans,
     window,
 )
+from flexspine.report.way import Way
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
+# %; from there on ticks at every 25 % would run together.
+MOST_TICKED = 130
+
 # More lines than this would hide the curves: only apexes are drawn, then none.
 MAX_EVENT_LINES = 80
+
+# m; heights to which the ground is raised, and what is left free over it.
+AIR = 0.01
 
 MANY_PHASES = 120  # from here on thick lines would run together
 
@@ -59,7 +67,7 @@ def plot_run(dataset: xr.Dataset) -> Figure:
     spans = phase_spans(dataset)
     with themed({"lines.linewidth": 1.5 if len(spans) <= MANY_PHASES else 0.7}):
         time = dataset["time"].values
-        details = describe(dataset)
+        details = excerpt_of(dataset) + describe(dataset)
         title = 0.38 + LINE * len(details)
         width = float(np.clip(7.4 + 0.1 * (len(spans) - 20), 7.4, 12.0))
         figure = Figure(figsize=(width, 8.2 + title), layout="constrained")
@@ -76,19 +84,34 @@ def plot_run(dataset: xr.Dataset) -> Figure:
         _draw_events(panels, dataset)
         elastic.set_xlabel("time (s)")
         figure.align_ylabels(panels)
-        _add_key(figure, dataset, spans)
         early = ending(dataset)
         add_title(figure, heading(dataset), details, wrap(early, 100) if early else ())
-        figure.draw_without_rendering()
+        _add_key(figure, dataset, spans)
         label_phases(bar, spans, bar.get_position().width * width)
     return figure
 
 
 def _draw_height(axes: Axes, dataset: xr.Dataset) -> None:
-    axes.plot(dataset["time"], dataset["com_y"], color=INK)
+    axes.plot(dataset["time"], dataset["com_y"], color=INK, label="CoM")
     axes.set_ylabel("CoM height (m)")
     axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+    way = Way.of(dataset)
+    if way is not None:
+        _draw_ground(axes, dataset, way)
     widen(axes, 0.01)
+
+
+def _draw_ground(axes: Axes, dataset: xr.Dataset, way: Way) -> None:
+    """Draw the ground under the CoM, raised so that both fit to one scale."""
+    time, under = dataset["time"].values, way.height(dataset["com_x"].values)
+    least = float((dataset["com_y"].values - under).min())
+    raised = max(np.floor((least - AIR) / AIR) * AIR, 0.0)
+    name = f"ground below,\nraised by {raised:.2f} m" if raised else "ground below"
+    axes.plot(time, under + raised, color=FAINT, linewidth=1.0, label=name)
+    low, high = axes.get_ylim()
+    axes.fill_between(time, low - 1, under + raised, color=FAINT, alpha=0.25, linewidth=0)
+    axes.set_ylim(low, high)
+    add_legend(axes)
 
 
 def _draw_pitch(axes: Axes, dataset: xr.Dataset) -> None:
@@ -137,8 +160,9 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
     given = _given(dataset)
     if given is not None:
         axes.plot(time, given, color=INK, linewidth=1.0, label="start and work")
-    axes.set_ylim(0, 100 if given is None else max(100.0, float(given.max()) + 2))
-    axes.set_yticks([0, 25, 50, 75, 100])
+    top = 100 if given is None else max(100.0, float(given.max()) + 2)
+    axes.set_ylim(0, top)
+    axes.yaxis.set_major_locator(MultipleLocator(25 * np.ceil(top / MOST_TICKED)))
     axes.set_ylabel("energy (% of\ninitial total)")
     add_legend(axes, *_reversed(axes))
     for name in ("legs", "spine", "dissipated"):
@@ -155,17 +179,20 @@ def _draw_energy(axes: Axes, elastic: Axes, dataset: xr.Dataset) -> None:
 
 
 def _given(dataset: xr.Dataset) -> Array | None:
-    """What there was and what actuators have put in since, in % of the initial total."""
+    """What there was at first and what actuators have put in since, in % of the former."""
     works = [dataset[str(name)].values for name in dataset if str(name).endswith("_work")]
     if not works:
         return None
     total = float(dataset["total_energy"][0])
-    given: Array = 100 * (1 + np.sum(works, axis=0) / total)
+    given: Array = 100 * (1 + sum(work - work[0] for work in works) / total)
     return given
 
 
 def _shares(dataset: xr.Dataset) -> dict[str, Array]:
-    """The energies in % of the initial total; those that the model lacks are left out."""
+    """The energies in % of the first total; those that the model lacks are left out.
+
+    What is dissipated counts from the first sample on.
+    """
     columns = {
         "spine": "spine_energy",
         "legs": "leg_energy",
@@ -174,6 +201,7 @@ def _shares(dataset: xr.Dataset) -> dict[str, Array]:
         "dissipated": "dissipated_energy",
     }
     energies = {name: dataset[column].values for name, column in columns.items()}
+    energies["dissipated"] = energies["dissipated"] - energies["dissipated"][0]
     total = sum(float(energy[0]) for energy in energies.values())
     return {
         name: 100 * energy / total
@@ -188,10 +216,23 @@ def _event_lines(dataset: xr.Dataset) -> list[tuple[Any, str, Array]]:
     apex = np.array(["apex" in kind for kind in kinds], dtype=bool)
     contact = np.array(["touchdown" in k or "lift-off" in k for k in kinds], dtype=bool) & ~apex
     rest = ~apex & ~contact
-    lines = [("--", "apex", times[apex]), (":", ", ".join(sorted(set(kinds[rest]))), times[rest])]
+    others = _without_sides({name for kind in kinds[rest] for name in str(kind).split(" + ")})
+    lines = [("--", "apex", times[apex]), (":", ", ".join(others), times[rest])]
     if len(times) <= MAX_EVENT_LINES:
         lines.insert(0, ("-", "touchdown, lift-off", times[contact]))
     return [line for line in lines if 0 < len(line[2]) <= MAX_EVENT_LINES]
+
+
+def _without_sides(names: set[str]) -> list[str]:
+    """Events that both fore and hind legs have once, without the side."""
+    fore, hind = SIDES
+    return sorted(
+        {
+            plain if {f"{fore} {plain}", f"{hind} {plain}"} <= names else name
+            for name in names
+            for plain in [name.removeprefix(f"{fore} ").removeprefix(f"{hind} ")]
+        }
+    )
 
 
 def _draw_events(panels: list[Axes], dataset: xr.Dataset) -> None:
@@ -215,13 +256,25 @@ def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:
         Line2D([], [], color=INK, linestyle=style, linewidth=0.7, label=name)
         for style, name, _ in _event_lines(dataset)
     ]
-    # A legend fills its columns first.
+    for columns in range(max(len(phases), len(lines)), 0, -1):
+        # A legend fills its columns first.
+        rows = _rows(phases, columns) + _rows(lines, columns)
+        legend = figure.legend(
+            handles=[handle for column in zip(*rows, strict=True) for handle in column],
+            loc="outside lower left", ncols=columns, fontsize=SMALL_SIZE, columnspacing=1.6,
+            handlelength=1.5,
+        )  # fmt: skip
+        figure.draw_without_rendering()
+        if legend.get_window_extent().x1 <= figure.bbox.x1:
+            return
+        legend.remove()
+
+
+def _rows(entries: Sequence[Artist], columns: int) -> list[list[Artist]]:
+    """Entries of a legend in rows, the last one filled up."""
     blank = Line2D([], [], linestyle="none", label=" ")
-    pairs = list(zip_longest(phases, lines, fillvalue=blank))
-    figure.legend(
-        handles=[handle for pair in pairs for handle in pair], loc="outside lower left",
-        ncols=len(pairs), fontsize=SMALL_SIZE, columnspacing=1.6, handlelength=1.5,
-    )  # fmt: skip
+    rows = [[*entries[at : at + columns]] for at in range(0, len(entries), columns)]
+    return [row + [blank] * (columns - len(row)) for row in rows]
 
 
 def _reversed(axes: Axes) -> tuple[list[Any], list[str]]:

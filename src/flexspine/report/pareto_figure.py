@@ -205,9 +205,17 @@ def _details(record: Record) -> list[str]:
     if shifts:
         parts.append(f"by phase {100 * shifts[0][0]:+g} to {100 * shifts[0][1]:+g} %")
     gaits = [point for front in record["fronts"].values() for point in front["points"]]
-    parts.append("filled: stable" if any(g["stable"] for g in gaits) else "no gait is stable")
-    sentence = wrap(record["told"], LETTERS) if record["told"] else []
-    return [*joined(parts, LETTERS), *sentence]
+    stable = "filled: stable" if any(g["stable"] for g in gaits) else "no gait is stable"
+    return [*joined(parts, LETTERS), *joined([*wrap(_bought(record), LETTERS), stable], LETTERS)]
+
+
+def _bought(record: Record) -> str:
+    """What stiffness by phase buys, in short."""
+    if not record["gains"] or not all(record["gains"].values()):
+        return str(record["told"] or "")
+    most = {name: 100 * max(0.0, *shares) for name, shares in record["gains"].items()}
+    told = [f"{LABELS[name].splitlines()[0]} up to {m:.1f} % lower" for name, m in most.items()]
+    return f"by phase: {', '.join(told)}, the other kept"
 
 
 def _called(name: str) -> str:

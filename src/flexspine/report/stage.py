@@ -16,10 +16,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Polygon
 from matplotlib.ticker import MultipleLocator
 
-from flexspine.report.caption import describe, ending, heading
+from flexspine.report.caption import describe, ending, excerpt_of, heading
 from flexspine.report.stick_figure import ARROW_LENGTH, ARROW_WIDTH, Scale, arrow_outline
 from flexspine.report.style import FAINT, INK, SMALL_SIZE, TEXT_SIZE, TITLE_SIZE
 from flexspine.report.way import Way, heights
@@ -42,6 +42,9 @@ STAGE = WIDTH - LEFT - RIGHT
 BAR_FOOT, BAR_HEIGHT = 0.46, 0.2
 ABOVE_BAR = 0.6  # for positions and the force key
 STATUS = HEIGHT - 0.78  # the line that tells phase, bend and time
+
+
+LETTERS = 115  # of small type; what fits into a line
 
 
 @dataclass(frozen=True)
@@ -171,11 +174,12 @@ def _draw_backdrop(dataset: xr.Dataset, scenery: Scenery) -> NDArray[np.uint8]:
     bar.set_xlabel("time (s)", labelpad=1)
     write(figure, (0.15, HEIGHT - 0.2), heading(dataset), size=TITLE_SIZE, fontweight="bold")
     write(figure, (0.15, HEIGHT - 0.41), describe(dataset)[0])
-    write(figure, (0.15, HEIGHT - 0.57), shorten(ending(dataset) or "", 110))
+    told = "  ·  ".join([*excerpt_of(dataset), ending(dataset) or ""]).removesuffix("  ·  ")
+    write(figure, (0.15, HEIGHT - 0.57), shorten(told, LETTERS))
     start, end = scenery.limits
     part = "" if start <= dataset["time"][0] else f"the last {end - start:.3g} s, "
-    told = part + tell_speed(scenery.slow_down)
-    write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), told, ha="right")
+    pace = part + tell_speed(scenery.slow_down)
+    write(figure, (WIDTH - RIGHT, HEIGHT - 0.2), pace, ha="right")
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba())[::-1]
@@ -207,12 +211,13 @@ def draw_ground(
     outline = np.array([[reach[0], 0.0], [reach[1], 0.0]]) if way is None else way.points
     axes.plot(*outline.T, color=INK, linewidth=1.0, zorder=2.5)
     depth = 0.35 * step
-    strokes = [[(at, top), (at - depth, top - depth)] for at, top in zip(x, y, strict=True)]
-    lines = LineCollection(strokes, colors=FAINT, linewidths=0.8, zorder=1)
-    axes.add_collection(lines)
-    lines.set_clip_path(
-        Rectangle((reach[0], -1e3), reach[1] - reach[0], 2e3, transform=axes.transData)
-    )
+    strokes = [
+        ((right, top - (at - right)), (left, top - (at - left)))
+        for at, top in zip(x, y, strict=True)
+        for left, right in [np.clip((at - depth, at), *reach)]
+        if left < right
+    ]
+    axes.add_collection(LineCollection(strokes, colors=FAINT, linewidths=0.8, zorder=1))
 
 
 def add_force_key(

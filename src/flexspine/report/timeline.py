@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from flexspine.errors import InputError
+from flexspine.models.legs import SIDES
 from flexspine.report.style import INK, PHASE_COLORS, SMALL_SIZE
 
 if TYPE_CHECKING:
@@ -104,12 +105,38 @@ def apex_times(dataset: xr.Dataset) -> NDArray[np.float64]:
     return np.unique(times)
 
 
+def stride_times(dataset: xr.Dataset) -> NDArray[np.float64]:
+    """Return the times (s) of the apexes at which strides begin and end.
+
+    Between two of them both legs have left the ground: a run that is steered has further apexes.
+    """
+    times, kinds = events(dataset)
+    found: list[float] = []
+    left: set[str] = set()
+    for time, kind in zip(times.tolist(), kinds.tolist(), strict=True):
+        left |= {side for side in SIDES if f"{side} lift-off" in kind}
+        if "apex" in kind and len(left) == len(SIDES):
+            found.append(time)
+            left = set()
+    first = apex_times(dataset)[:1]
+    at_start = first[first == dataset["time"].values[0]]
+    return np.unique(np.append(at_start, found))
+
+
 def last_cycle(dataset: xr.Dataset) -> tuple[float, float]:
-    """Return start and end (s) of the last apex-to-apex interval, else those of the run."""
-    apexes = apex_times(dataset)
-    if len(apexes) > 1:
-        return float(apexes[-2]), float(apexes[-1])
-    return float(dataset["time"].values[0]), float(dataset["time"].values[-1])
+    """Return start and end (s) of the last stride from apex to apex, without one those of the run.
+
+    Of a run that ended early: of its last stretch up to the end, as long as a stride.
+    """
+    time = dataset["time"].values
+    first, last = float(time[0]), float(time[-1])
+    strides = stride_times(dataset)
+    if len(strides) < 2:
+        return first, last
+    start, end = strides[-2:].tolist()
+    if dataset.attrs.get("outcome", "completed") == "completed":
+        return start, end
+    return max(first, last - (end - start)), last
 
 
 def window(time: NDArray[np.float64]) -> tuple[float, float]:
@@ -131,7 +158,7 @@ def draw_phase_bar(axes: Axes, spans: list[Span], limits: tuple[float, float]) -
 def label_phases(axes: Axes, spans: list[Span], width: float) -> None:
     """Write the names into a bar that is ``width`` inches wide, where they fit."""
     left, right = axes.get_xlim()
-    room = 2.2 * SMALL_SIZE / 72  # in; two letters and some air
+    room = 1.6 * SMALL_SIZE / 72  # in; two letters
     for span in spans:
         start, end = max(span.start, left), min(span.end, right)
         if (end - start) / (right - left) * width > room:

@@ -52,21 +52,29 @@ class Terrain:
             raise ParameterError("ground from a file has no numbers", "leave them away")
         return Ground.read(self.kind)
 
-    def ground(self, seed: int, stride: float, strides: int) -> Ground:
-        """The ground for a seed, strides of ``stride`` m. Raises `InputError`."""
+    @property
+    def all_numbers(self) -> dict[str, float]:
+        """Its numbers, those that are left at their defaults too. Raises `InputError`."""
         if self.track is not None:
-            return self.track
+            return {}
         if self.kind not in KINDS and Path(self.kind).exists():
             raise ParameterError(
                 f"'{self.kind}' is no file of ground", "give a file whose name ends in .csv"
             )
         if self.kind not in KINDS:
             raise UnknownNameError("kind of ground", self.kind, KINDS)
-        make, known = KINDS[self.kind]
+        _, known = KINDS[self.kind]
         for name in self.numbers:
             if name not in known:
                 raise UnknownNameError(f"number of '{self.kind}'", name, known)
-        given: dict[str, Any] = {**known, **self.numbers}
+        return {**known, **self.numbers}
+
+    def ground(self, seed: int, stride: float, strides: int) -> Ground:
+        """The ground for a seed, strides of ``stride`` m. Raises `InputError`."""
+        if self.track is not None:
+            return self.track
+        given: dict[str, Any] = {**self.all_numbers}
+        make, _ = KINDS[self.kind]
         if self.kind in RANDOM:
             given |= {"length": RESERVE * stride * strides + BEGINS, "seed": seed}
         where = float(np.random.default_rng([seed, 1]).uniform())  # not what draws heights
@@ -84,6 +92,9 @@ KINDS: Mapping[str, tuple[Callable[..., Ground], Mapping[str, float]]] = {
     "blocks": (Ground.blocks, {"height": 0.002, "spacing": 0.3}),
 }
 RANDOM = ("rough", "blocks")
+
+# All other numbers are lengths in m.
+NO_LENGTHS = ("degrees", "count")
 
 
 @dataclass(frozen=True)
@@ -150,11 +161,10 @@ def walk_over(
     stride: float,
     strides: int,
     seed: int = 0,
-    record: bool = False,
 ) -> SteeredRun:
     """Run over ground of a seed; ``stride`` is the length (m) of an undisturbed one."""
     ground = terrain.ground(seed, stride, strides)
-    return steer(model.on(ground), steering, strides=strides, seed=seed, record=record)
+    return steer(model.on(ground), steering, strides=strides, seed=seed)
 
 
 def distance_to_fall(
