@@ -83,7 +83,7 @@ GROUNDS = {
     "ramp": Ground.ramp(0.01, 1.0, at=0.4),
     "waves": Ground.waves(0.004, 0.7, at=0.3),
     "rough": Ground.rough(0.004, 0.11, 20.0, seed=5, at=0.3),
-    "blocks": Ground.blocks(-0.004, 0.35, 20.0, seed=1, at=0.3),
+    "blocks": Ground.blocks(0.004, 0.35, 20.0, seed=0, at=0.3),
 }
 
 
