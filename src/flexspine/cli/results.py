@@ -15,6 +15,8 @@ from flexspine.cli.output import Steps
 from flexspine.errors import OUT_OF_SPACE, OutputError
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexspine.models.simulation import Run
 
 ANIMATIONS = ("animation.mp4", "animation.gif")
@@ -139,3 +141,25 @@ def _write_all(
         for name in ANIMATIONS:
             progress.begin(f"drawing {name}")
             animate(dataset, stage / name, progress=progress.at)
+
+
+def write_robot_run(
+    stage: Path, dataset: xr.Dataset, record: dict[str, Any], animation: bool, progress: Steps
+) -> None:
+    """Write everything there is about a run of a robot, in the plane or in space."""
+    from flexspine.models.files import write_netcdf
+
+    progress.begin("writing data")
+    write_netcdf(dataset, stage / "trajectory.nc")
+    write_json(record, stage / "summary.json")
+    if dataset.sizes["time"] < 2:
+        return  # nothing to draw
+    from flexspine.report.animation import animate
+    from flexspine.report.robot_figure import plot_robot
+
+    progress.begin("drawing")
+    plot_robot(dataset).savefig(stage / "figure.png")
+    if animation:
+        for name in ANIMATIONS:
+            progress.begin(f"drawing {name}")
+            animate(dataset, stage / name, slow_down=1.0, progress=progress.at)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -81,8 +81,9 @@ def run3d(
 
         flexspine run3d --locked --set gait.speed=0.4 --json
     """
-    from flexspine.cli.results import ResultDirectory
+    from flexspine.cli.results import ResultDirectory, write_robot_run
     from flexspine.engines.installed import mujoco_module
+    from flexspine.engines.space_dataset import space_dataset
     from flexspine.engines.space_measures import space_record, summarize_space
     from flexspine.engines.space_run import run_in_space
 
@@ -100,7 +101,7 @@ def run3d(
         record = space_record(run, summary)
         if directory is not None:
             with directory.stage(PICTURES) as stage:
-                _write(stage, run, record, animation, progress)
+                write_robot_run(stage, space_dataset(run), record, animation, progress)
             if render:
                 with directory.stage() as stage:
                     _film(stage, run, progress)
@@ -127,29 +128,6 @@ def body_and_walk(robot: str, gait: str, given: list[str] | None, lock: bool) ->
     changes = {name: value for name, value in told.items() if name not in own}
     walk = walk.with_values(changes) if changes else walk
     return (locked(body, spine_of(body)) if lock else body), walk
-
-
-def _write(
-    stage: Path, run: SpaceRun, record: dict[str, Any], animation: bool, progress: Steps
-) -> None:
-    from flexspine.cli.results import ANIMATIONS, write_json
-    from flexspine.engines.space_dataset import space_dataset
-    from flexspine.models.files import write_netcdf
-    from flexspine.report.animation import animate
-    from flexspine.report.robot_figure import plot_robot
-
-    progress.begin("writing data")
-    dataset = space_dataset(run)
-    write_netcdf(dataset, stage / "trajectory.nc")
-    write_json(record, stage / "summary.json")
-    if dataset.sizes["time"] < 2:
-        return  # nothing to draw
-    progress.begin("drawing")
-    plot_robot(dataset).savefig(stage / "figure.png")
-    if animation:
-        for name in ANIMATIONS:
-            progress.begin(f"drawing {name}")
-            animate(dataset, stage / name, slow_down=1.0, progress=progress.at)
 
 
 def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:

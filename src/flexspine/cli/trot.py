@@ -100,7 +100,7 @@ def trot(
 
         flexspine trot --compare --out results/spines
     """
-    from flexspine.cli.results import ResultDirectory
+    from flexspine.cli.results import ResultDirectory, write_robot_run
     from flexspine.control.laws import Tracking
     from flexspine.control.spine_comparison import compare_spines
     from flexspine.control.trot import Trot
@@ -108,6 +108,7 @@ def trot(
     from flexspine.control.walk_measures import summarize_walk
     from flexspine.control.walk_record import walk_record
     from flexspine.models.robot_file import load_robot
+    from flexspine.models.robot_run import robot_dataset
     from flexspine.models.simulation import DEFAULT_TOLERANCE
 
     interruptible()
@@ -155,7 +156,7 @@ def trot(
         record = walk_record(run, summary)
         if directory is not None:
             with directory.stage(PICTURES) as stage:
-                _write(stage, run, record, animation, progress)
+                write_robot_run(stage, robot_dataset(run), record, animation, progress)
     if json:
         print_json(record)
     else:
@@ -188,30 +189,6 @@ def _refuse_besides_compare(given: Mapping[str, object]) -> None:
                 f"{option} and --compare are both given",
                 f"leave {option}, as controllers com and pd are compared",
             )
-
-
-def _write(
-    stage: Path, run: RobotRun, record: dict[str, Any], animation: bool, progress: Steps
-) -> None:
-    from flexspine.cli.results import ANIMATIONS, write_json
-    from flexspine.models.files import write_netcdf
-    from flexspine.models.robot_run import robot_dataset
-
-    progress.begin("writing data")
-    dataset = robot_dataset(run)
-    write_netcdf(dataset, stage / "trajectory.nc")
-    write_json(record, stage / "summary.json")
-    if dataset.sizes["time"] < 2:
-        return  # nothing to draw
-    from flexspine.report.animation import animate
-    from flexspine.report.robot_figure import plot_robot
-
-    progress.begin("drawing")
-    plot_robot(dataset).savefig(stage / "figure.png")
-    if animation:
-        for name in ANIMATIONS:
-            progress.begin(f"drawing {name}")
-            animate(dataset, stage / name, slow_down=1.0, progress=progress.at)
 
 
 # Name, label and unit of what is compared.

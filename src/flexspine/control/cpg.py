@@ -61,15 +61,16 @@ class Rhythm:
 RHYTHMS = ("trot", "bound")
 
 
-def rhythm(name: str, legs: Mapping[str, Leg]) -> Rhythm:
+def rhythm(name: str, legs: Mapping[str, Leg], lag: float = 0.5) -> Rhythm:
     """The rhythm of a gait: ``trot`` (diagonal pairs) or ``bound`` (fore pair against hind pair).
 
+    ``lag`` is the share of a cycle by which the second pair is behind the first.
     Raises `UnknownNameError`, and `ParameterError` unless two legs are at each of two hips.
     """
     if name not in RHYTHMS:
         raise UnknownNameError("rhythm", name, RHYTHMS)
     pairs = diagonal_pairs(legs) if name == "trot" else hip_pairs(legs)
-    offsets = {leg: number / 2 for number, pair in enumerate(pairs) for leg in pair}
+    offsets = {leg: number * lag for number, pair in enumerate(pairs) for leg in pair}
     return Rhythm({leg: offsets[leg] for leg in legs})
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from flexspine.control.cpg import RHYTHMS, Rhythm
-from flexspine.control.leg_pairs import diagonal_pairs, hip_pairs
+from flexspine.control.cpg import RHYTHMS, Rhythm, rhythm
+from flexspine.control.leg_pairs import hip_pairs
 from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.leg_geometry import Leg
 from flexspine.models.model import Source
@@ -87,10 +87,8 @@ class Walk:
         """Its rhythm on these legs. Raises `ParameterError` unless two are at each of two hips."""
         gait = self.gains.gait
         hind, _ = hip_pairs(legs)
-        pairs = diagonal_pairs(legs) if self.rhythm == "trot" else hip_pairs(legs)
-        lags = {leg: number * gait.lag for number, pair in enumerate(pairs) for leg in pair}
-        return Rhythm(
-            {leg: lags[leg] for leg in legs},
+        return replace(
+            rhythm(self.rhythm, legs, gait.lag),
             frequency=gait.frequency,
             duty=gait.duty,
             stride=gait.speed * gait.duty / gait.frequency,
