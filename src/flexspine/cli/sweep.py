@@ -50,8 +50,8 @@ def sweep(
 
         flexspine sweep FILE.toml --out DIR --scheduler tcp://node1:8786
     """
-    from flexspine.studies.plan import RUNS, WALKS
     from flexspine.studies.sweep import sweep as carry_out
+    from flexspine.studies.task_kinds import RUNS, WALKS
     from flexspine.studies.tasks import FOUND
 
     with unfinished_is_kept(out), counting("points") as progress:

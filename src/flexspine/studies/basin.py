@@ -25,9 +25,10 @@ from flexspine.models.presets import load_model
 from flexspine.models.simulation import check_count
 from flexspine.studies.axes import GRID, Axis, free_axes, grid_points
 from flexspine.studies.following import STEP
-from flexspine.studies.plan import RUNS, Plan
+from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
 from flexspine.studies.tables import Row
+from flexspine.studies.task_kinds import RUNS
 
 STRIDES, POINTS = 100, 100
 

@@ -17,9 +17,10 @@ from flexspine.models.simulation import check_count
 from flexspine.parameters import shortened
 from flexspine.studies.axes import GRID, Axis
 from flexspine.studies.basin import read_columns
-from flexspine.studies.plan import GAITS, Plan
+from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
 from flexspine.studies.tables import Row
+from flexspine.studies.task_kinds import GAITS
 
 STIFFNESS, SPEED = "spine.stiffness", "mean_speed"
 

@@ -15,7 +15,8 @@ from flexspine.models.presets import load_model
 from flexspine.models.robot_file import load_robot
 from flexspine.parameters import flattened, is_finite, shortened
 from flexspine.studies.axes import Axis
-from flexspine.studies.plan import WALKS, Plan
+from flexspine.studies.plan import Plan
+from flexspine.studies.task_kinds import WALKS
 from flexspine.studies.walkers import Walker
 
 ENTRIES = {

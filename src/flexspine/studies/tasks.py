@@ -20,8 +20,9 @@ from flexspine.parameters import values
 from flexspine.studies.axes import OF_GAITS
 from flexspine.studies.following import Line, LostGaitError, carried
 from flexspine.studies.parts import Part, make_part
-from flexspine.studies.plan import GAITS, RUNS, SEARCHES, WALKS, Plan
+from flexspine.studies.plan import Plan
 from flexspine.studies.tables import Row, gait_row
+from flexspine.studies.task_kinds import GAITS, RUNS, SEARCHES, WALKS
 from flexspine.studies.walkers import Walker, row_names
 
 if TYPE_CHECKING:

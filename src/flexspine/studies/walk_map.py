@@ -14,9 +14,10 @@ from flexspine.models.simulation import check_count
 from flexspine.parameters import is_number, shortened
 from flexspine.studies.axes import GRID, Axis
 from flexspine.studies.basin import read_columns
-from flexspine.studies.plan import WALK_SECONDS, WALKS, Plan
+from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
 from flexspine.studies.tables import Row
+from flexspine.studies.task_kinds import WALK_SECONDS, WALKS
 from flexspine.studies.walkers import Walker
 
 STIFFNESS, SPEED = "spine.stiffness", "gait.speed"
