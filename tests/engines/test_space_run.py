@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -17,7 +14,7 @@ from PIL import Image
 from flexspine import load_robot
 from flexspine.control.gains import load_walk
 from flexspine.engines import render
-from flexspine.engines.render import rendered
+from flexspine.engines.render import opengl, rendered
 from flexspine.engines.space_dataset import SPACE_VARIABLES, space_dataset
 from flexspine.engines.space_measures import space_record, summarize_space
 from flexspine.engines.space_run import CpgCourse, SpaceRun, run_in_space
@@ -171,23 +168,8 @@ def test_the_plane_keeps_the_robot() -> None:
         assert np.all(np.abs(data[angle].values) < 1e-12)
 
 
-def opengl() -> bool:
-    """Whether anything can be drawn here, as MuJoCo itself tells."""
-    script = (
-        "import mujoco; m = mujoco.MjModel.from_xml_string('<mujoco/>'); mujoco.Renderer(m, 8, 8);"
-        "import os; os._exit(0)"
-    )
-    return any(
-        subprocess.run(
-            [sys.executable, "-c", script], env={**os.environ, "MUJOCO_GL": name},
-            capture_output=True, check=False,
-        ).returncode == 0
-        for name in ("egl", "osmesa")
-    )  # fmt: skip
-
-
 def test_pictures_show_the_robot_where_there_is_opengl(tmp_path: Path) -> None:
-    if not opengl():
+    if opengl() is None:
         pytest.skip("neither EGL nor OSMesa is here")
     times = np.array([0.0, 0.5])
     first, second = rendered(walked(), times, (160, 90))

@@ -18,6 +18,7 @@ from flexspine.cli import (
     branch,
     cache,
     control,
+    doctor,
     equations,
     export,
     forces,
@@ -80,6 +81,7 @@ app.command("tune")(tune.tune)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
+app.command("doctor")(doctor.doctor)
 app.add_typer(export.app, name="export")
 app.add_typer(verify.app, name="verify")
 app.add_typer(cache.app, name="cache")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -117,9 +116,10 @@ def rerun(
 def count_of(processes: int | None) -> int:
     """How many processes to use: by default one for each core that this process may use."""
     from flexspine.models.simulation import check_count
+    from flexspine.workers.crew import cores
 
     if processes is None:
-        return len(os.sched_getaffinity(0))
+        return cores()
     return check_count("--processes", processes)
 
 

@@ -25,6 +25,24 @@ WIDTH, HEIGHT = 640, 360
 # Which OpenGL is tried, best first, if the environment does not say (MUJOCO_GL).
 BACKENDS = ("egl", "osmesa")
 
+EMPTY = "<mujoco/>"
+
+
+def opengl() -> str | None:
+    """Which OpenGL can draw here without a screen, if any."""
+    script = f"import mujoco, os; mujoco.Renderer(mujoco.MjModel.from_xml_string({EMPTY!r}), 8, 8)"
+    own = os.environ.get("MUJOCO_GL")
+    for backend in (own,) if own else BACKENDS:
+        done = subprocess.run(
+            [sys.executable, "-c", f"{script}; os._exit(0)"],
+            env={**os.environ, "MUJOCO_GL": backend},
+            capture_output=True,
+            check=False,
+        )
+        if done.returncode == 0:
+            return backend
+    return None
+
 
 def rendered(
     run: SpaceRun, times: NDArray[np.float64], size: tuple[int, int] = (WIDTH, HEIGHT)
