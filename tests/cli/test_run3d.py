@@ -51,6 +51,10 @@ def test_a_person_is_told_speed_forces_contact_and_energy(cli: Cli) -> None:
         assert words in done.stdout
 
 
+def test_a_film_without_a_place_is_refused(cli: Cli) -> None:
+    assert_one_clear_line(cli("run3d", "--render"), "--render")
+
+
 def test_a_fall_is_exit_code_1_with_advice(cli: Cli, tmp_path: Path) -> None:
     done = cli("run3d", "--seconds", "2", "--set", "servo.limit=0.5", "--out", "here")
     assert done.returncode == 1
@@ -82,6 +86,8 @@ def test_a_locked_spine_has_one_joint_less(cli: Cli, tmp_path: Path) -> None:
         (("run3d", "--seconds", "nan"), "seconds"),
         (("run3d", "--sensing", "-1"), "sensing"),
         (("run3d", "--set", "hip_2.stiffness=3"), "hip_2.stiffness"),
+        (("run3d", "--seed", "-1"), "--seed"),
+        (("run3d", "--locked", "--set", "spine.stiffness=3"), "--locked"),
         (("tune", "--gait", "canter"), "canter"),
         (("tune", "--speed", "inf"), "speed"),
     ],

@@ -238,6 +238,26 @@ def test_the_drawn_robot_stands_on_its_feet() -> None:
     assert hips[:, 2] == pytest.approx(np.full(4, 0.8 * 0.41), abs=1e-12)
 
 
+def test_held_it_stands_by_itself_and_limp_it_sinks() -> None:
+    space = SpaceRobot(load_robot("sc618"))
+    heights = []
+    for hold in (True, False):
+        model = specification(mujoco, space, hold=hold).compile()
+        data = mujoco.MjData(model)
+        for _ in range(round(1.0 / model.opt.timestep)):
+            mujoco.mj_step(model, data)
+        heights.append(data.subtree_com[1, 2])
+    assert heights[0] > 0.27
+    assert heights[1] < 0.1
+
+
+def test_two_legs_in_one_place_are_refused(tmp_path: Path) -> None:
+    text = (files("flexspine") / "robots" / "sc618.toml").read_text()
+    (tmp_path / "odd.toml").write_text(text.replace('side = "right"', 'side = "left"', 1))
+    with pytest.raises(ParameterError, match=r"legs\.hind_2 and legs\.hind_1 are at one hip"):
+        SpaceRobot(load_robot(tmp_path / "odd.toml"))
+
+
 def test_abduction_swings_the_foot_to_the_left() -> None:
     engine = SpaceEngine(SpaceRobot(load_robot("sc618")), ground=False)
     start = standing_start(engine.space)

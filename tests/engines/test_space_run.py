@@ -21,6 +21,8 @@ from flexspine.engines.space_run import CpgCourse, SpaceRun, run_in_space
 from flexspine.errors import InputError, MachineError, ParameterError
 from flexspine.models.space import SpaceRobot
 from flexspine.report.film import write_film
+from flexspine.report.sagittal import sagittal
+from flexspine.report.timeline import phase_spans
 
 Array = NDArray[np.float64]
 
@@ -155,8 +157,22 @@ def test_what_cannot_be_asked_for_is_refused() -> None:
         run_in_space(robot, walk, 0.0)
     with pytest.raises(ParameterError, match="sensing = 2"):
         run_in_space(robot, walk, 1.0, sensing=2.0)
+    with pytest.raises(ParameterError, match="-1"):
+        run_in_space(robot, walk, 1.0, seed=-1)
     with pytest.raises(ParameterError, match="out of reach"):
         run_in_space(robot, walk.with_values({"gait.height": 0.42}), 1.0)
+
+
+def test_bars_of_stance_change_where_feet_begin_and_cease_to_slide() -> None:
+    """In the side view a stretch of one footing is one of standing, or of sliding, of each foot."""
+    data = space_dataset(walked())
+    flat = sagittal(data)
+    slides, stands = data["slides"].values > 0, data["stands"].values > 0
+    assert slides.any()
+    for span in phase_spans(flat, "footing"):
+        for table in (slides, stands):
+            part = table[span.first : span.last + 1]
+            assert np.all(part == part[0])
 
 
 def test_the_plane_keeps_the_robot() -> None:

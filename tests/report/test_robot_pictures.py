@@ -212,7 +212,7 @@ def test_a_run_without_samples_is_refused(data: xr.Dataset, tmp_path: Path) -> N
         with pytest.raises(InputError, match="no samples"):
             draw(empty)
     for draw in (plot_run, strip):
-        with pytest.raises(InputError, match="to_dataset"):
+        with pytest.raises(InputError, match="plot_robot"):
             draw(data)
     with pytest.raises(InputError, match="robot_dataset"):
         plot_robot(data.drop_vars("grf"))

@@ -32,6 +32,10 @@ def mjcf(
         typer.Option(metavar="FOOT", help="The robot of 'verify pinned', held by this foot."),
     ] = None,
     locked: Annotated[bool, typer.Option("--locked", help="Lock the spine.")] = False,
+    hold: Annotated[
+        bool,
+        typer.Option("--hold", help="Springs at the motors keep it standing; else it sinks down."),
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Write this file (default: to the terminal).")
     ] = None,
@@ -39,11 +43,11 @@ def mjcf(
     """Write the robot as MJCF, which MuJoCo, its viewer and other tools load (extra engine).
 
     Units are SI and radians; x forward, y left, z up (of --pinned: x forward, y up). Motors turn
-    hinges by the torque that they are told. Exit code 0: done; 2: bad input; 3: MuJoCo is missing
-    or the machine failed.
+    hinges by the torque that they are told, and are limp before. Exit code 0: done; 2: bad input;
+    3: MuJoCo is missing or the machine failed.
 
     Examples:
-        flexspine export mjcf --out sc618.xml && python -m mujoco.viewer --mjcf=sc618.xml
+        flexspine export mjcf --hold --out sc618.xml && python -m mujoco.viewer --mjcf=sc618.xml
 
         flexspine export mjcf --pinned toe_1 --out pinned.xml
     """
@@ -60,12 +64,14 @@ def mjcf(
     mujoco = mujoco_module()
     if plane and pinned:
         raise InputError("--plane and --pinned are both given", "leave one of them")
+    if hold and pinned:
+        raise InputError("--hold and --pinned are both given", "leave one of them")
     body = load_robot(robot, numbers("--set", set_))
     body = lock(body, spine_of(body)) if locked else body
     if pinned is not None:
         spec = pinned_specification(mujoco, body.linkage, pinned)
     else:
-        spec = specification(mujoco, SpaceRobot(body, plane))
+        spec = specification(mujoco, SpaceRobot(body, plane), hold=hold)
     spec.compile()
     text = spec.to_xml()
     if out is None:

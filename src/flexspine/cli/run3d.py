@@ -19,6 +19,7 @@ from flexspine.cli.options import (
     numbers,
 )
 from flexspine.cli.output import Steps, print_json, steps
+from flexspine.errors import InputError
 
 if TYPE_CHECKING:
     from flexspine.control.gains import Walk
@@ -34,7 +35,12 @@ FILMS, FILM_RATE = ("film.mp4", "film.gif"), 25
 OF_WALKS = ("gait.", "servo.")
 
 Walks = Annotated[
-    str, typer.Option("--gait", help="trot, bound, or a TOML file, such as 'tune' writes.")
+    str,
+    typer.Option(
+        "--gait",
+        help="trot or bound of the robot, one of another robot (sc618-trot), or a TOML file, such "
+        "as 'tune' writes.",
+    ),
 ]
 WalkAssignments = Annotated[
     list[str] | None,
@@ -61,7 +67,7 @@ def run3d(
     sensing: Annotated[
         float, typer.Option(help="Read angles of joints off by up to this much, in rad.")
     ] = 0.0,
-    seed: Annotated[int, typer.Option(help="Of what is drawn at random.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
     render: Annotated[
         bool, typer.Option("--render", help="With --out, film it as MuJoCo draws it (OpenGL).")
     ] = False,
@@ -89,6 +95,8 @@ def run3d(
 
     interruptible()
     mujoco_module()
+    if render and out is None:
+        raise InputError("--render is given without --out", "give --out, where the film goes")
     body, walk = body_and_walk(robot, gait, set_, locked)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
@@ -120,14 +128,22 @@ def body_and_walk(robot: str, gait: str, given: list[str] | None, lock: bool) ->
     from flexspine.control.spine_comparison import spine_of
     from flexspine.models.locking import locked
     from flexspine.models.robot_file import load_robot
+    from flexspine.models.space import SpaceRobot
 
     told = numbers("--set", given)
     own = {name: value for name, value in told.items() if not name.startswith(OF_WALKS)}
     body = load_robot(robot, own)
+    SpaceRobot(body)  # whatever is wrong with it comes first
     walk = load_walk(gait, body.name)
     changes = {name: value for name, value in told.items() if name not in own}
     walk = walk.with_values(changes) if changes else walk
-    return (locked(body, spine_of(body)) if lock else body), walk
+    if not lock:
+        return body, walk
+    spine = spine_of(body)
+    for name in own:
+        if name.startswith(f"{spine}."):
+            raise InputError(f"--set {name} and --locked are both given", "leave one of them")
+    return locked(body, spine), walk
 
 
 def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:

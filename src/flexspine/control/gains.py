@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,7 @@ def walk_names(robot: str) -> list[str]:
 
 
 def load_walk(walk: str | Path, robot: str) -> Walk:
-    """Load a walk of a robot by name, or from a TOML file.
+    """Load a walk of a robot by name, one of another by its full name, or from a TOML file.
 
     Raises `UnknownNameError`, `PresetError` and `ParameterError`.
     """
@@ -122,21 +123,29 @@ def load_walk(walk: str | Path, robot: str) -> Walk:
             why = failure.strerror if isinstance(failure, OSError) else "is not text"
             raise PresetError(f"'{name}' cannot be read ({why})", "give a TOML file") from None
         name = path.stem
-    elif name in walk_names(robot):
-        place = files("flexspine") / "walks" / f"{robot}-{name}.toml"
-        text = place.read_text(encoding="utf-8")
     else:
-        known = walk_names(robot)
-        if not known:
-            raise PresetError(
-                f"robot '{robot}' has no gait '{name}'",
-                "give a TOML file, such as 'flexspine tune --out' writes",
-            )
-        raise UnknownNameError("gait", name, known)
+        text = _shipped(name, robot).read_text(encoding="utf-8")
     try:
         return _walk(name, text)
     except InputError as failure:
         raise PresetError(f"gait '{walk}': {failure.message}", failure.remedy) from None
+
+
+def _shipped(name: str, robot: str) -> Traversable:
+    """The file of a walk that comes along: of this robot, or by its full name of any."""
+    place = files("flexspine") / "walks"
+    for each in (f"{robot}-{name}.toml", f"{name}.toml"):
+        if (place / each).is_file():
+            return place / each
+    known = walk_names(robot)
+    if known:
+        raise UnknownNameError("gait", name, known)
+    others = sorted(each.name.removesuffix(".toml") for each in place.iterdir())
+    raise PresetError(
+        f"robot '{robot}' has no gait '{name}' of its own",
+        f"give that of another robot ({', '.join(others)}) or a TOML file, such as "
+        "'flexspine tune --out' writes",
+    )
 
 
 def _walk(name: str, text: str) -> Walk:

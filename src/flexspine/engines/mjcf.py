@@ -26,7 +26,17 @@ STEP = 2.5e-4
 # Coordinates of a robot that is kept to the plane.
 ROOT_X, ROOT_Z, ROOT_PITCH = "root_x", "root_z", "root_pitch"
 
-COLORS = {"trunk": (0.35, 0.44, 0.55, 1.0), "leg": (0.82, 0.42, 0.16, 1.0)}
+COLORS = {
+    "trunk": (0.35, 0.44, 0.55, 1.0),
+    "left": (0.93, 0.68, 0.47, 1.0),
+    "right": (0.82, 0.42, 0.16, 1.0),
+}
+# N m/rad, N m s/rad; of springs that keep the robot standing.
+HOLD = 300.0, 4.0
+
+# m; between the trunk and the legs, as pictures show them.
+GAP = 0.004
+
 DARK = (0.15, 0.15, 0.17, 1.0)
 GROUND = (0.93, 0.93, 0.91), (0.83, 0.84, 0.83)
 
@@ -51,9 +61,19 @@ def standing_start(space: SpaceRobot, height: float | None = None) -> Start:
     return Start((float(place[0]), float(place[1])), float(pitch), angles)
 
 
-def specification(mujoco: Any, space: SpaceRobot, *, ground: bool = True) -> Any:
-    """The robot as an `MjSpec`, on flat ground unless there is to be none."""
+def specification(
+    mujoco: Any, space: SpaceRobot, *, ground: bool = True, hold: bool = False
+) -> Any:
+    """The robot as an `MjSpec`, on flat ground unless there is to be none.
+
+    With ``hold`` springs and dampers at the hinges with motors keep it standing by itself.
+    """
     spec = _drawn(mujoco, space, ground)
+    if hold:
+        for joint in spec.joints:
+            if joint.name in space.motors:
+                joint.stiffness, joint.damping = [HOLD[0], 0, 0], [HOLD[1], 0, 0]
+                joint.springref = joint.ref
     if ground:
         # How much a foot gives is known of a compiled model only.
         model = spec.compile()
@@ -179,14 +199,14 @@ def _add_body(mujoco: Any, parent: Any, space: SpaceRobot, part: Part, start: St
         # Forces may have quadratic and cubic parts there; ours are linear.
         joint.stiffness, joint.damping = [hinge.stiffness, 0, 0], [hinge.damping, 0, 0]
         joint.springref = hinge.rest
-    # Shanks end in the middle of their feet.
+    # Shanks end in the middle of their feet, and the trunk is drawn between the legs.
     shown = part.length - sum(ball.radius for ball in space.balls if ball.part == part.name)
     body.add_geom(
         name=part.name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[shown / 2, part.width / 2, part.height / 2],
+        size=[shown / 2, _drawn_width(space, part) / 2, part.height / 2],
         pos=[shown / 2, 0, 0],
-        rgba=COLORS["trunk" if part.name in space.trunk else "leg"],
+        rgba=COLORS[_kind(space, part)],
         contype=0,
         conaffinity=0,
     )
@@ -196,6 +216,23 @@ def _add_body(mujoco: Any, parent: Any, space: SpaceRobot, part: Part, start: St
             xyaxes=[1, 0, 0, 0, 0.2, 1],
         )  # fmt: skip
     return body
+
+
+def _kind(space: SpaceRobot, part: Part) -> str:
+    """The trunk, or the side that a leg is on."""
+    sides = {
+        link: space.robot.legs[leg.name].side
+        for leg in space.legs.values()
+        for link in (leg.thigh, leg.shank)
+    }
+    return sides.get(part.name, "trunk")
+
+
+def _drawn_width(space: SpaceRobot, part: Part) -> float:
+    if part.name not in space.trunk:
+        return part.width
+    between = space.numbers.hip_width - space.numbers.leg_width
+    return min(part.width, max(between, part.width / 2) - GAP)
 
 
 def _free_in_plane(mujoco: Any, body: Any, start: Start) -> None:

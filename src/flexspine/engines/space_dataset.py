@@ -19,8 +19,9 @@ from flexspine.parameters import values
 if TYPE_CHECKING:
     import xarray as xr
 
-# Of the largest force that friction can; solvers of cones come no closer.
-EDGE = 0.999
+# Of the largest force that friction can; solvers of cones come no closer. Feet that bear less than
+# this share of the weight do not count.
+EDGE, BORNE = 0.999, 1e-2
 
 # By name: dimensions, unit, meaning.
 SPACE_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -90,15 +91,17 @@ def _columns(run: SpaceRun) -> dict[str, Array]:
         **samples,
         **{name: angle.mean(axis=1) for name, angle in angles.items()},
         "stands": (samples["grf"][..., 2] > 0).astype(float),
-        "slides": _slides(samples["grf"], run.robot.friction).astype(float),
+        "slides": _slides(run).astype(float),
         "total_energy": samples["kinetic_energy"] + samples["potential_energy"],
     }
 
 
-def _slides(forces: Array, friction: float) -> NDArray[np.bool_]:
+def _slides(run: SpaceRun) -> NDArray[np.bool_]:
     """Which feet are at the edge of their cones, shape (times, feet)."""
-    found: NDArray[np.bool_] = (forces[..., 2] > 0) & (
-        np.hypot(forces[..., 0], forces[..., 1]) > EDGE * friction * forces[..., 2]
+    forces, linkage = run.samples["grf"], run.robot.linkage
+    across = np.hypot(forces[..., 0], forces[..., 1])
+    found: NDArray[np.bool_] = (forces[..., 2] > BORNE * linkage.mass * linkage.gravity) & (
+        across > EDGE * run.robot.friction * forces[..., 2]
     )
     return found
 
@@ -114,7 +117,7 @@ def _attributes(run: SpaceRun) -> dict[str, Any]:
         for name, leg in space.legs.items()
     }
     return {
-        "title": f"{robot.name} in {'its plane' if space.plane else 'space'}: {run.walk.name}",
+        "title": f"{robot.name}, in {'its plane' if space.plane else 'space'}: {run.walk.name}",
         "model": "articulated robot in space",
         "robot": robot.name,
         "citation": robot.source.citation,

@@ -27,6 +27,7 @@ from flexspine.models.articulated import FELL
 from flexspine.models.model import check_between
 from flexspine.models.robot import Robot
 from flexspine.models.space import LegJoints, SpaceRobot
+from flexspine.parameters import check_seed
 
 # rad/s; joints of a robot never turn faster, numbers that have gone wrong do.
 FASTEST = 1e4
@@ -155,8 +156,9 @@ def run_in_space(
     will do.
     """
     check_between("seconds", seconds, 0.01, 3600)
-    if sensing:
+    if sensing != 0:
         check_between("sensing", sensing, 0, 1)
+    check_seed(seed)
     check_between("step", step, 1e-6, 1e-2)
     space = SpaceRobot(robot, plane)
     course = CpgCourse(space, walk)

@@ -109,6 +109,7 @@ class SpaceRobot:
                     'write side = "left" or side = "right"',
                 )
         _check_springs(self.robot, self.legs)
+        _check_sides(self.robot, self.legs)
 
     @cached_property
     def legs(self) -> dict[str, Leg]:
@@ -298,6 +299,20 @@ def _of_box(mass: float, pitch: float, box: tuple[float, float]) -> Triple:
     """Inertias about x, y and z of a box of a width and a height that has this pitch inertia."""
     across, upright = mass * box[0] ** 2 / 12, min(mass * box[1] ** 2 / 12, pitch)
     return across + upright, pitch, pitch - upright + across
+
+
+def _check_sides(robot: Robot, legs: Mapping[str, Leg]) -> None:
+    """Refuse two legs in one place."""
+    taken: dict[tuple[float, str], str] = {}
+    for name, leg in legs.items():
+        place = (leg.hip, robot.legs[name].side)
+        if place in taken:
+            raise ParameterError(
+                f"robot '{robot.name}': legs.{name} and legs.{taken[place]} are at one hip on the "
+                f"{place[1]}",
+                "put one of them on the other side",
+            )
+        taken[place] = name
 
 
 def _check_springs(robot: Robot, legs: Mapping[str, Leg]) -> None:

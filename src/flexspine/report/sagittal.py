@@ -21,8 +21,14 @@ def sagittal(dataset: xr.Dataset) -> xr.Dataset:
 
     flat = dataset.sel(axis=["x", "z"]).assign_coords(axis=["x", "y"])
     feet = dataset["foot_name"].values.astype(str)
-    stands = dataset["stands"].values > 0
-    footing = np.array([" ".join(feet[row]) or "no foot" for row in stands])
+    stands, slides = (dataset[name].values > 0 for name in ("stands", "slides"))
+    sliding = np.char.add(feet, " slides")
+    footing = np.array(
+        [
+            ", ".join(np.where(off, sliding, feet)[on]) or "no foot"
+            for on, off in zip(stands, slides, strict=True)
+        ]
+    )
     return flat.assign(
         footing=("time", footing),
         event_time=("event", np.zeros(0)),

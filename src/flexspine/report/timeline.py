@@ -55,7 +55,10 @@ def check_samples(dataset: xr.Dataset, *, robot: bool = False) -> None:
     for name in NEEDED_OF_ROBOTS if robot else NEEDED:
         if name not in dataset:
             maker = "robot_dataset" if robot else "to_dataset"
-            raise InputError(f"the dataset has no '{name}'", f"give one made by {maker}")
+            remedy = f"give one made by {maker}"
+            if not robot and is_robot(dataset):
+                remedy = "draw a robot's run by plot_robot or animate"
+            raise InputError(f"the dataset has no '{name}'", remedy)
 
 
 def drawable(dataset: xr.Dataset) -> xr.Dataset:

@@ -24,15 +24,18 @@ PANEL = (2.5, 2.0)  # in
 # Of a colour map from soft to stiff.
 SHADES = (0.1, 0.85)
 
+# Of a panel's height; from one cross to the next.
+STACK = 0.035
+
 
 def plot_walks(found: WalkMap) -> Figure:
-    """Draw a panel for each measure; crosses at the foot are walks that ended early."""
+    """Draw a panel for each measure; crosses above the axis are walks that ended early."""
     rows = -(-len(MEASURES) // COLUMNS)
     with themed():
         details = [
             f"{found.name} in MuJoCo, {found.seconds:g} s each from standing, noisy sensors; "
             "measured over the second half",
-            "bars: the locked spine's range over walks that differ in noise alone",
+            "bars: range of the locked spine's walks that last, which differ in noise alone",
         ]
         size = (0.9 + PANEL[0] * COLUMNS, 0.9 + PANEL[1] * rows + LINE * len(details))
         figure = Figure(figsize=size, layout="constrained")
@@ -47,6 +50,9 @@ def plot_walks(found: WalkMap) -> Figure:
         ]
         keys.append(Line2D([], [], color=INK, marker="s", markersize=3.5, linewidth=1.1))
         labels = [*(f"{value:g}" for value in found.stiffnesses), "locked"]
+        if any(table.any() for table in found.fell.values()):
+            keys.append(Line2D([], [], color=INK, marker="x", markersize=4, linestyle="none"))
+            labels.append("ended\nearly")
         figure.legend(keys, labels, loc="outside right center", title="$k_t$\n(N m/rad)")
         add_title(figure, f"Spines in space: {found.rhythm}", details)
     return figure
@@ -72,14 +78,16 @@ def _draw(axes: Axes, found: WalkMap, name: str) -> None:
         )  # fmt: skip
     if name == "speed":
         axes.plot(found.speeds, found.speeds, color=INK, linewidth=0.6, linestyle=":")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(bottom=min(0.0, 1.1 * float(np.nanmin(table))) if name == "speed" else 0)
     for body, marked in found.fell.items():
         colors = _shades(found) if body == "flexible" else [INK] * len(found.stiffnesses)
         for j, color in enumerate(colors):
             here = found.speeds[marked[:, j]]
+            # One above the other, in the order of the key.
+            height = np.full(len(here), 0.03 + STACK * (j if body == "flexible" else -0.5))
             if len(here):
                 axes.plot(
-                    here, np.zeros(len(here)), marker="x", color=color, linestyle="none",
-                    clip_on=False,
+                    here, height, marker="x", markersize=4, color=color, linestyle="none",
+                    transform=axes.get_xaxis_transform(), clip_on=False,
                 )  # fmt: skip
     axes.set_ylabel(f"{label} ({unit})" if unit else label)

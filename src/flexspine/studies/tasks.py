@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexspine.engines.installed import mujoco_module
 from flexspine.errors import InputError, ParameterError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.search import DEFAULT_STARTS, find_gaits, pose_problems
@@ -47,7 +48,12 @@ def do_chunk(work: tuple[Plan, int]) -> Part:
 
 
 def check_task(plan: Plan) -> None:
-    """Try what can be known before anything is done. Raises `InputError`."""
+    """Try what can be known before anything is done.
+
+    Raises `InputError`, and `MachineError` where there is no MuJoCo to walk in.
+    """
+    if plan.task == WALKS:
+        mujoco_module()
     for number, model in enumerate(plan.bounders):
         if plan.task == GAITS:
             own = examine(model, tolerance=plan.tolerance)

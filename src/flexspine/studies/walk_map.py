@@ -55,6 +55,11 @@ def walk_plan(
     The locked one walks as often at every speed, each time with another noise on its sensors.
     Raises `ParameterError`.
     """
+    if not isinstance(walker, Walker):
+        raise ParameterError(
+            f"{shortened(walker)} is no walker",
+            'make one: Walker("name", load_robot(...), load_walk(...))',
+        )
     own = walker.numbers[SPEED]
     speeds = tuple(round(share * own, 4) for share in SPEEDS) if speeds is None else speeds
     for name, values in ((STIFFNESS, stiffnesses), (SPEED, speeds)):
