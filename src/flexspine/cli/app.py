@@ -27,6 +27,7 @@ from flexspine.cli import (
     limits,
     optimise,
     presets,
+    report,
     robustness,
     run3d,
     spines,
@@ -78,6 +79,7 @@ app.command("trot")(trot.trot)
 app.command("run3d")(run3d.run3d)
 app.command("spines")(spines.spines)
 app.command("tune")(tune.tune)
+app.command("report")(report.report)
 app.command("forces")(forces.forces)
 app.command("presets")(presets.presets)
 app.command("equations")(equations.equations)
