@@ -131,16 +131,14 @@ def _write_all(
     write_json(record, stage / "summary.json")
     if dataset.sizes["time"] < 2:
         return  # nothing to draw
-    from flexspine.report.animation import animate, strip
+    from flexspine.report.animation import strip
     from flexspine.report.figure import plot_run
 
     progress.begin("drawing")
     plot_run(dataset).savefig(stage / "figure.png")
     strip(dataset).savefig(stage / "strip.png")
     if animation:
-        for name in ANIMATIONS:
-            progress.begin(f"drawing {name}")
-            animate(dataset, stage / name, progress=progress.at)
+        _write_animations(stage, dataset, progress)
 
 
 def write_robot_run(
@@ -154,12 +152,17 @@ def write_robot_run(
     write_json(record, stage / "summary.json")
     if dataset.sizes["time"] < 2:
         return  # nothing to draw
-    from flexspine.report.animation import animate
     from flexspine.report.robot_figure import plot_robot
 
     progress.begin("drawing")
     plot_robot(dataset).savefig(stage / "figure.png")
     if animation:
-        for name in ANIMATIONS:
-            progress.begin(f"drawing {name}")
-            animate(dataset, stage / name, slow_down=1.0, progress=progress.at)
+        _write_animations(stage, dataset, progress)
+
+
+def _write_animations(stage: Path, dataset: xr.Dataset, progress: Steps) -> None:
+    from flexspine.report.animation import animate
+
+    for name in ANIMATIONS:
+        progress.begin(f"drawing {name}")
+        animate(dataset, stage / name, progress=progress.at)

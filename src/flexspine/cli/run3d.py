@@ -22,17 +22,14 @@ from flexspine.cli.output import Steps, print_json, steps
 from flexspine.errors import InputError
 
 if TYPE_CHECKING:
-    from flexspine.control.gains import Walk
     from flexspine.engines.space_measures import SpaceSummary
     from flexspine.engines.space_run import SpaceRun
-    from flexspine.models.robot import Robot
+    from flexspine.studies.walkers import Walker
 
 # What a run in space writes, in which an earlier one's pictures would pass for its own.
 PICTURES = re.compile(r"(figure|animation|film)\.(png|mp4|gif)")
 
 FILMS, FILM_RATE = ("film.mp4", "film.gif"), 25
-
-OF_WALKS = ("gait.", "servo.")
 
 Walks = Annotated[
     str,
@@ -97,14 +94,15 @@ def run3d(
     mujoco_module()
     if render and out is None:
         raise InputError("--render is given without --out", "give --out, where the film goes")
-    body, walk = body_and_walk(robot, gait, set_, locked)
+    walker = walker_of(robot, gait, set_, lock=locked)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         progress.begin("walking")
         run = run_in_space(
-            body, walk, seconds, plane=plane, sensing=sensing, seed=seed, progress=progress.at
-        )
+            walker.robot, walker.walk, seconds,
+            plane=plane, sensing=sensing, seed=seed, progress=progress.at,
+        )  # fmt: skip
         summary = summarize_space(run)
         record = space_record(run, summary)
         if directory is not None:
@@ -122,28 +120,27 @@ def run3d(
     return 0 if run.outcome.completed else 1
 
 
-def body_and_walk(robot: str, gait: str, given: list[str] | None, lock: bool) -> tuple[Robot, Walk]:
+def walker_of(robot: str, gait: str, given: list[str] | None, *, lock: bool = False) -> Walker:
     """What walks, and how, as options tell it. Raises `InputError`."""
     from flexspine.control.gains import load_walk
     from flexspine.control.spine_comparison import spine_of
-    from flexspine.models.locking import locked
     from flexspine.models.robot_file import load_robot
     from flexspine.models.space import SpaceRobot
+    from flexspine.studies.walkers import Walker
 
-    told = numbers("--set", given)
-    own = {name: value for name, value in told.items() if not name.startswith(OF_WALKS)}
-    body = load_robot(robot, own)
+    changes = numbers("--set", given)
+    body = load_robot(robot)
     SpaceRobot(body)  # whatever is wrong with it comes first
     walk = load_walk(gait, body.name)
-    changes = {name: value for name, value in told.items() if name not in own}
-    walk = walk.with_values(changes) if changes else walk
+    walker = Walker(f"{body.name}-{walk.name}", body, walk).with_values(changes)
+    walker.check()
     if not lock:
-        return body, walk
+        return walker
     spine = spine_of(body)
-    for name in own:
+    for name in changes:
         if name.startswith(f"{spine}."):
             raise InputError(f"--set {name} and --locked are both given", "leave one of them")
-    return locked(body, spine), walk
+    return walker.with_locked_spine()
 
 
 def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:

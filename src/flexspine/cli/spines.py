@@ -10,7 +10,7 @@ from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.basin import Out, how_made, keep_beside
 from flexspine.cli.options import DEFAULT_ROBOT, Json, RobotName
 from flexspine.cli.output import counting, print_json
-from flexspine.cli.run3d import WalkAssignments, Walks, body_and_walk
+from flexspine.cli.run3d import WalkAssignments, Walks, walker_of
 from flexspine.cli.sweep import Processes, Scheduler, count_of, unfinished_is_kept
 
 if TYPE_CHECKING:
@@ -58,12 +58,10 @@ def spines(
     from flexspine.report.walks_figure import plot_walks
     from flexspine.studies.sweep import sweep as carry_out
     from flexspine.studies.walk_map import STIFFNESSES, read_walks, walk_plan
-    from flexspine.studies.walkers import Walker
 
     mujoco_module()
-    body, walk = body_and_walk(robot, gait, set_, lock=False)
     plan = walk_plan(
-        Walker(f"{body.name}-{walk.name}", body, walk),
+        walker_of(robot, gait, set_),
         tuple(stiffness or STIFFNESSES),
         tuple(speed) if speed else None,
         seconds=seconds,

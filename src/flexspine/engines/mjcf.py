@@ -15,6 +15,7 @@ import numpy as np
 from flexspine.control.leg_function import standing
 from flexspine.engines.contact import IMPEDANCE, TANGENTIAL, ContactLaw
 from flexspine.engines.installed import LEAST_INERTIA
+from flexspine.hybrid.compile import Array
 from flexspine.models.space import OUT, PITCH, Part, SpaceRobot
 
 # Of the reach of the shortest leg; how high hips are in the posture of the description.
@@ -50,15 +51,19 @@ class Start(NamedTuple):
     pitch: float
     angles: dict[str, float]
 
+    @classmethod
+    def of(cls, space: SpaceRobot, q: Array) -> Start:
+        """Where a robot in the plane is at ``q``, shape (N,)."""
+        (x, z), pitch = space.root(q)
+        angles = {name: float(angle) for name, angle in space.angles(q).items()}
+        return cls((float(x), float(z)), float(pitch), angles)
+
 
 def standing_start(space: SpaceRobot, height: float | None = None) -> Start:
     """The robot on its feet, hips at a ``height`` (m) above the lowest points of its feet."""
     if height is None:
         height = STANDING * min(leg.reach for leg in space.legs.values())
-    q = standing(space.robot, height, {})
-    place, pitch = space.root(q)
-    angles = {name: float(angle) for name, angle in space.angles(q).items()}
-    return Start((float(place[0]), float(place[1])), float(pitch), angles)
+    return Start.of(space, standing(space.robot, height, {}))
 
 
 def specification(

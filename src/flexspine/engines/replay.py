@@ -65,14 +65,7 @@ def replay(robot: Robot, motion: Motion, *, step: float) -> Replay:
         for table in (space.angles(motion.q), space.rates(motion.rates))
     )
     torques = motion.torques @ space.by_motor.T
-    place, pitch = space.root(motion.q[0])
-    engine.set_down(
-        Start(
-            (float(place[0]), float(place[1])),
-            float(pitch),
-            dict(zip(names, wanted[0].tolist(), strict=True)),
-        )
-    )
+    engine.set_down(Start.of(space, motion.q[0]))
     outcome = Outcome(COMPLETED, f"replayed {motion.times[-1]:g} s")
     rows = [_row(engine, np.zeros(len(space.balls)), 0.0)]
     with engine.unheard():

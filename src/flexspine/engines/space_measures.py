@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from flexspine._version import SCHEMA_VERSION
 from flexspine.engines.installed import mujoco_version
 from flexspine.engines.space_dataset import space_dataset
 from flexspine.engines.space_run import SpaceRun
+from flexspine.gaits.record import finite
 from flexspine.hybrid.compile import Array
 from flexspine.parameters import values
 
@@ -152,10 +152,6 @@ def space_record(run: SpaceRun, summary: SpaceSummary) -> dict[str, Any]:
         "gains": values(run.walk.gains),
         "parameters": dict(run.robot.numbers),
         "contact": {foot: asdict(law) for foot, law in run.laws.items()},
-        "measures": {name: _plain(value) for name, value in asdict(summary).items()},
+        "measures": finite(asdict(summary)),
         "mujoco_version": mujoco_version(),
     }
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -105,10 +105,7 @@ class CpgCourse:
     def start(self) -> Start:
         """The robot at rest on all its feet."""
         place, _ = self._cpg.feet(self._cpg.begin())
-        q = self._function.posture(place + self._hips)
-        root, pitch = self.space.root(q)
-        angles = {name: float(angle) for name, angle in self.space.angles(q).items()}
-        return Start((float(root[0]), float(root[1])), float(pitch), angles)
+        return Start.of(self.space, self._function.posture(place + self._hips))
 
     def servo(self, count: int) -> Servo:
         """What joints are to do at so many samples. Raises `ParameterError` if they cannot."""

@@ -53,7 +53,7 @@ def finite(value: Any) -> Any:
     """Replace what JSON cannot hold by None."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [finite(item) for item in value]
     if isinstance(value, float) and not isfinite(value):
         return None

@@ -28,7 +28,7 @@ from flexspine.studies.walkers import Walker
 
 # What one piece of work and one file hold: some seconds of it.
 MOST_STRIDES, MOST_RUNS, FEWEST_RUNS = 400_000, 16384, 256
-SEARCHES_EACH, WALKS_EACH = 16, 4
+EACH = {SEARCHES: 16, WALKS: 4}
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Plan:
             return len(axis.values) or axis.steps or 1
         if self.chunk is not None:
             return self.chunk
-        if self.task in (SEARCHES, WALKS):
-            return SEARCHES_EACH if self.task == SEARCHES else WALKS_EACH
+        if self.task in EACH:
+            return EACH[self.task]
         runs = MOST_STRIDES // int(self.options.get("strides", 1))
         return min(max(runs, FEWEST_RUNS), MOST_RUNS)
 
@@ -126,7 +126,7 @@ class Plan:
             "method": self.method,
             "samples": self.samples,
             "seed": self.seed,
-            "options": self._options,
+            "options": self.all_options,
             "axes": {axis.name: axis.record() for axis in self.axes},
             "models": [
                 model.record() if isinstance(model, Walker) else model_record(model)
@@ -138,7 +138,7 @@ class Plan:
         return dict(json.loads(json.dumps(record, default=lambda number: number.item())))
 
     @property
-    def _options(self) -> dict[str, Any]:
+    def all_options(self) -> dict[str, Any]:
         """The options with those that were not told."""
         if self.task == WALKS:
             return {"seconds": WALK_SECONDS, "sensing": 0.0, **self.options}

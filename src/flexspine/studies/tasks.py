@@ -94,7 +94,7 @@ def _walks(plan: Plan, chunk: int) -> pa.Table:
 
     walker, first, count = plan.of_chunk(chunk)
     assert isinstance(walker, Walker)
-    points, options = plan.at(chunk), plan.record()["options"]
+    points, options = plan.at(chunk), plan.all_options
     own = {name: column for name, column in points.items() if name in walker.numbers}
     names = ["point", *(column_of(axis.name) for axis in plan.axes), *row_names()]
     rows = []

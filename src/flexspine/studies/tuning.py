@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from flexspine._version import __version__
+from flexspine.control.cpg import RHYTHMS
 from flexspine.control.gains import Gains, Walk
 from flexspine.engines.space_measures import SpaceSummary, summarize_space
 from flexspine.engines.space_run import SpaceRun, run_in_space
@@ -129,8 +130,8 @@ def tune(
     ``store`` is a file that keeps what is tried; the same call goes on with it. Raises
     `NoWalkError` if all fall, `ParameterError`, and `MachineError` without a MuJoCo that will do.
     """
-    if rhythm not in ("trot", "bound"):
-        raise UnknownNameError("rhythm", rhythm, ("trot", "bound"))
+    if rhythm not in RHYTHMS:
+        raise UnknownNameError("rhythm", rhythm, RHYTHMS)
     check_between("speed", speed, -5, 5)
     check_between("seconds", seconds, 0.5, 600)
     for name, count in (("draws", draws), ("rounds", rounds), ("children", children)):

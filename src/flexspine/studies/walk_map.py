@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -143,11 +142,10 @@ def read_walks(path: str | Path) -> WalkMap:
         tables.append({name: columns[name].astype(float).reshape(shape) for name in MEASURES})
         fell.append((columns["outcome"] != "completed").reshape(shape))
     walker = plan.walkers[0]
-    options: dict[str, Any] = plan.record()["options"]
     return WalkMap(
         name=walker.robot.name,
         rhythm=walker.walk.rhythm,
-        seconds=options["seconds"],
+        seconds=plan.all_options["seconds"],
         speeds=speeds,
         stiffnesses=stiffnesses,
         flexible=tables[0],
