@@ -27,7 +27,6 @@ pictures: $(VENV)/.installed
 	$(BIN)/flexspine basin --out $(OUT)/pictures/basin
 	$(BIN)/flexspine map --out $(OUT)/pictures/map
 	$(BIN)/flexspine trot --seconds 3.2 --out $(OUT)/pictures/trot
-	$(BIN)/python -c "from flexspine import load_robot, plot_coordinates as p; p(load_robot('sc618')).savefig('docs/images/sc618_coordinates.png')"
 	mkdir -p docs/images
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
 	cp $(OUT)/pictures/study/peak_grf_over_speed.png $(OUT)/pictures/study/damping.png docs/images/

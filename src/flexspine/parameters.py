@@ -24,6 +24,7 @@ class Quantity:
     """What is declared about one parameter.
 
     ``lower`` and ``upper`` are bounds in ``unit``; ``lower_is_open`` tells ``>`` from ``>=``.
+    Without a ``default`` a value has to be given.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Quantity:
     lower: float
     upper: float
     lower_is_open: bool
+    default: float | None
 
     @property
     def told(self) -> str:
@@ -184,6 +186,7 @@ def _quantity(name: str, field: FieldInfo) -> Quantity:
         lower=float(bounds.get("gt", bounds.get("ge", float("-inf")))),
         upper=float(bounds["le"]),
         lower_is_open="gt" in bounds,
+        default=None if field.is_required() else float(field.default),
     )
 
 

@@ -1,4 +1,7 @@
-"""The coordinates of a robot: its links, joints and feet in a posture that tells them apart."""
+"""The coordinates of a robot: its links, joints and feet in a posture that tells them apart.
+
+Those of a bounder are drawn by `flexspine.report.bounder_coordinates`.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from flexspine.models.model import Model
+from flexspine.report.bounder_coordinates import plot_bounder_coordinates
 from flexspine.report.stick_figure import wavy_arc
 from flexspine.report.style import (
     BLUE,
@@ -43,12 +48,15 @@ TRUNK_ANGLES = (8.0, -14.0)
 CHAIN_ANGLE = 35.0  # of each link from its parent, for a robot without legs
 
 
-def plot_coordinates(robot: Robot) -> Figure:
+def plot_coordinates(robot: Robot | Model) -> Figure:
     """Draw a robot with its coordinates ``q``, in their order, by number and name of the joint.
 
     Angles of links are relative to the extension of their parents, but for the first, which is
-    from +x; lengths are in m.
+    from +x; lengths are in m. Of a bounder, draw its pitches, legs and lengths, with the letters
+    of ``flexspine equations``.
     """
+    if isinstance(robot, Model):
+        return plot_bounder_coordinates(robot)
     linkage = robot.linkage
     q = told_apart(robot)
     ends = np.array(
