@@ -16,6 +16,7 @@ from PIL import Image
 
 from flexspine.errors import InputError, MachineError, OutputError, ParameterError
 from flexspine.report.caption import ending, heading
+from flexspine.report.picture import Picture
 from flexspine.report.postures import Posture, postures
 from flexspine.report.robot_scene import RobotScene
 from flexspine.report.sagittal import is_spatial, sagittal
@@ -202,7 +203,7 @@ def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:
     rows = [shown[i : i + PER_ROW] for i in range(0, frames, PER_ROW)]
     width = max(len(rows[0]), 3) * CELL
     with themed():
-        figure = Figure(figsize=(0.75 + width, 1.0 + len(rows) * (height + LABELS)))
+        figure = Picture(figsize=(0.75 + width, 1.0 + len(rows) * (height + LABELS)))
         size = figure.get_size_inches()
         for number, row in enumerate(rows):
             foot = size[1] - 0.6 - number * (height + LABELS) - height

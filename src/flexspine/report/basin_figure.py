@@ -18,6 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from flexspine.errors import InputError
 from flexspine.models.dataset import VARIABLES
 from flexspine.report.caption import joined
+from flexspine.report.picture import Picture
 from flexspine.report.style import INK, LINE, SMALL_SIZE, add_title, themed
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def plot_basin(basins: Sequence[Basin]) -> Figure:
     with themed({"hatch.linewidth": 0.5}):
         width = SIDES + COLUMN * max(len(basins), 2)
         details = joined(_details(basins[0]), int(LETTERS * width))
-        figure = Figure(figsize=(width, PANELS + 0.65 + LINE * len(details)), layout="constrained")
+        figure = Picture(figsize=(width, PANELS + 0.65 + LINE * len(details)), layout="constrained")
         panels = figure.subplots(2, len(basins), sharex="col", sharey="col", squeeze=False)
         steps = [step for step in STEPS if step < basins[0].wanted] + [basins[0].wanted]
         survived, left = _survived(steps), _left()

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from flexspine.models.actuation import BARE
 from flexspine.models.bounder import X, Y
 from flexspine.parameters import values
+from flexspine.report.picture import Picture
 from flexspine.report.stick_figure import wavy_arc, zigzag
 from flexspine.report.style import (
     BLUE,
@@ -48,7 +49,7 @@ def plot_bounder_coordinates(model: Model) -> Figure:
     Lengths are in proportion (m); the posture is one that tells them apart, not one of a gait.
     """
     with themed():
-        figure = Figure(figsize=(8.0, 4.6), layout="constrained")
+        figure = Picture(figsize=(8.0, 4.6), layout="constrained")
         axes = figure.subplots()
         _Sketch(axes, model).draw()
         axes.set_aspect("equal")

@@ -27,6 +27,7 @@ from flexspine.gaits.landmarks import (
 )
 from flexspine.report.branch_axis import NAMES, Axis, axis_of, spread
 from flexspine.report.caption import SIDES, joined, of_legs
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     FAINT,
     GREEN,
@@ -101,7 +102,7 @@ def plot_branch(record: Record) -> Figure:
         spent = any(gait["work"] for gait in points)
         extra = len(record["free"]) + spent
         height = 0.38 + LINE * (len(details) + sum(1 + text.count("\n") for text in key))
-        figure = Figure(figsize=(7.4, THREE + FURTHER * extra + height), layout="constrained")
+        figure = Picture(figsize=(7.4, THREE + FURTHER * extra + height), layout="constrained")
         panels = figure.subplots(3 + extra, 1, sharex=True, height_ratios=[1.2, *[1] * (2 + extra)])
         forces, *further, radius, angles = panels
         spread(angles, [axis.of(gait) for gait in points])

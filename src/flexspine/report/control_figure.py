@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from flexspine.errors import InputError
 from flexspine.report.caption import joined
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     FAINT,
     GREEN,
@@ -57,7 +58,7 @@ def plot_control(record: Mapping[str, Any], table: Sequence[Mapping[str, float]]
     with themed():
         details = joined(_details(record), LETTERS)
         height = 0.75 + PANEL * panels + LINE * len(details)
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        figure = Picture(figsize=(WIDTH, height), layout="constrained")
         every = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
         _draw_deviation(every[0], columns)
         rest = list(every[1:])

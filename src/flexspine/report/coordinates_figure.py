@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from flexspine.models.model import Model
 from flexspine.report.bounder_coordinates import plot_bounder_coordinates
+from flexspine.report.picture import Picture
 from flexspine.report.stick_figure import wavy_arc
 from flexspine.report.style import (
     BLUE,
@@ -63,7 +64,7 @@ def plot_coordinates(robot: Robot | Model) -> Figure:
         [[linkage.point(q, each.name, s) for s in (0.0, each.length)] for each in linkage.links]
     )
     with themed():
-        figure = Figure(figsize=(8.4, 5.3), layout="constrained")
+        figure = Picture(figsize=(8.4, 5.3), layout="constrained")
         axes = figure.subplots()
         drawing = _Drawing(figure, axes, robot, q, ends)
         drawing.draw()

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flexspine.report.caption import joined
+from flexspine.report.picture import Picture
 from flexspine.report.style import BLUE, FAINT, INK, LINE, SMALL_SIZE, add_title, themed
 from flexspine.studies.wayfaring import NO_LENGTHS
 
@@ -27,7 +28,7 @@ def plot_distances(found: Wayfaring, record: Mapping[str, Any]) -> Figure:
     share = np.concatenate([[1.0], going, going[-1:]])
     with themed():
         details = joined(_details(found, record), LETTERS)
-        figure = Figure(figsize=(WIDTH, HEIGHT + LINE * len(details)), layout="constrained")
+        figure = Picture(figsize=(WIDTH, HEIGHT + LINE * len(details)), layout="constrained")
         axes = figure.subplots()
         axes.step(steps, 100 * share, where="post", color=BLUE)
         axes.fill_between(steps, 100 * share, step="post", color=BLUE, alpha=0.12, linewidth=0)

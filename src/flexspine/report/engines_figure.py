@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     BLUE,
     GREEN,
@@ -41,7 +42,7 @@ def plot_engines(pinned: PinnedCheck, replay: ReplayCheck, template: TemplateChe
     with themed():
         details = ["dashed: what is allowed; dotted: the order that is expected"]
         size = (SIZE[0], SIZE[1] + LINE * len(details))
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Picture(figsize=size, layout="constrained")
         one, two, three = figure.subplots(1, 3)
         _draw_pinned(one, pinned)
         _draw_replay(two, replay)

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from flexspine.report.caption import SIDES, describe, ending, excerpt_of, heading
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     ENERGY_COLORS,
     FAINT,
@@ -70,7 +71,7 @@ def plot_run(dataset: xr.Dataset) -> Figure:
         details = excerpt_of(dataset) + describe(dataset)
         title = 0.38 + LINE * len(details)
         width = float(np.clip(7.4 + 0.1 * (len(spans) - 20), 7.4, 12.0))
-        figure = Figure(figsize=(width, 8.2 + title), layout="constrained")
+        figure = Picture(figsize=(width, 8.2 + title), layout="constrained")
         bar, *panels = figure.subplots(
             6, 1, sharex=True, height_ratios=[0.24, 1, 1, 1.2, 1.15, 0.95]
         )

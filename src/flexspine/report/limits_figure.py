@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
+from flexspine.report.picture import Picture
 from flexspine.report.style import LINE, add_title, themed
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def plot_limits(cells: Sequence[Cell]) -> Figure:
             "Gaussian noise: six seeds, 1000 strides; pushes, steps (at eight places): 50 strides"
         ]
         size = (1.0 + PANEL[0] * len(designs), 0.9 + PANEL[1] * len(names) + LINE * len(details))
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Picture(figsize=size, layout="constrained")
         panels = figure.subplots(len(names), len(designs), sharex=True, sharey="row", squeeze=False)
         for row, name in zip(panels, names, strict=True):
             label, factor, unit = LABELS[name]

@@ -17,6 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from flexspine.errors import InputError
 from flexspine.parameters import values
 from flexspine.report.caption import joined, of_legs
+from flexspine.report.picture import Picture
 from flexspine.report.style import INK, LINE, SMALL_SIZE, VERMILION, add_title, themed
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ HALO: Look = {"color": "white", "linewidth": 2.0, "alpha": 0.45}
 STABLE: Look = {"color": VERMILION, "linewidth": 2.4}
 
 
-class Picture(NamedTuple):
+class Panel(NamedTuple):
     """How something is drawn of every gait."""
 
     content: Array
@@ -74,7 +75,7 @@ def plot_map(found: GaitMap, published: Sequence[float] = PUBLISHED) -> Figure:
         details = joined(_details(found), LETTERS)
         marks = [k for k in published if found.stiffnesses[0] <= k <= found.stiffnesses[-1]]
         key = _key(found, marks)
-        figure = Figure(figsize=(WIDTH, HEIGHT + 0.65 + LINE * len(details)), layout="constrained")
+        figure = Picture(figsize=(WIDTH, HEIGHT + 0.65 + LINE * len(details)), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, picture in zip(panels, (_forces(found), _radii(found)), strict=True):
             image = _draw_image(axes, found, picture)
@@ -96,24 +97,24 @@ def plot_map(found: GaitMap, published: Sequence[float] = PUBLISHED) -> Figure:
     return figure
 
 
-def _forces(found: GaitMap) -> Picture:
+def _forces(found: GaitMap) -> Panel:
     known = found.peak_grf[np.isfinite(found.peak_grf)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     step = next((s for s in (10, 20, 50, 100, 200, 500) if (high - low) / s < 12), 1000)
     levels = [float(step * n) for n in range(ceil(low / step), ceil(high / step))]
     norm = Normalize(low, high)
-    return Picture(found.peak_grf, "peak GRF (N per leg pair)", "viridis", norm, levels)
+    return Panel(found.peak_grf, "peak GRF (N per leg pair)", "viridis", norm, levels)
 
 
-def _radii(found: GaitMap) -> Picture:
+def _radii(found: GaitMap) -> Panel:
     low, high = float(np.nanmin(found.radius)), float(np.nanmax(found.radius))
     levels = [v for v in (0.2, 0.5, 1, 1.5, 2, 3, 4, 5, 7, 10, 20, 50) if low < v < high]
     norm = LogNorm(low, max(high, 1.01 * low))
     label = "spectral radius on the energy level: stable below 1"
-    return Picture(found.radius, label, "cividis_r", norm, levels)
+    return Panel(found.radius, label, "cividis_r", norm, levels)
 
 
-def _draw_image(axes: Axes, found: GaitMap, picture: Picture) -> AxesImage:
+def _draw_image(axes: Axes, found: GaitMap, picture: Panel) -> AxesImage:
     """Draw every gait as a cell, cut where gaits end, and hatch what is left empty."""
     axes.add_patch(Rectangle((0, 0), 1, 1, transform=axes.transAxes, zorder=0, **ABSENT))
     (x0, dx, nx), (y0, dy, ny) = (

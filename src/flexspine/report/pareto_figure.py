@@ -12,6 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from flexspine.errors import InputError
 from flexspine.report.branch_axis import NAMES
 from flexspine.report.caption import joined, of_legs
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     FAINT,
     GREEN,
@@ -91,7 +92,7 @@ def plot_fronts(record: Record) -> Figure:
     with themed():
         details = _details(record)
         size = WIDTH, UNIT * sum(heights) + LINE * len(details)
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Picture(figsize=size, layout="constrained")
         panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         _draw(panels[0], fronts, second, first, {"drawstyle": "steps-post"})
         for spine in fronts:

@@ -9,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     BLUE,
     GREEN,
@@ -63,7 +64,7 @@ def plot_pinned(check: PinnedCheck) -> Figure:
             layout.append(["postures"])
         height = ROW * len(layout) + 0.4 + LINE * len(details)
         width = WIDTH if count > 1 else WIDTH * 0.7
-        figure = Figure(figsize=(width, height))
+        figure = Picture(figsize=(width, height))
         panels: dict[str, Axes] = figure.subplot_mosaic(layout)
         for i, case in enumerate(check.cases):
             for row, draw in enumerate(over_time):

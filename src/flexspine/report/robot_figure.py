@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from flexspine.errors import ParameterError
 from flexspine.report.caption import WIDE, describe, ending, heading, joined
+from flexspine.report.picture import Picture
 from flexspine.report.robot_parts import RobotLeg, RobotParts, typical_force
 from flexspine.report.sagittal import is_spatial, sagittal
 from flexspine.report.style import (
@@ -75,7 +76,7 @@ def plot_robot(dataset: xr.Dataset, *, window: tuple[float, float] | None = None
         early = ending(dataset)
         heights = [0.2 * len(parts.legs), *[0.62] * len(joints), 1.05, 1.05, *com, 0.9]
         size = (8.4, sum(heights) + 0.12 * len(heights) + 1.0 + LINE * len(details))
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Picture(figsize=size, layout="constrained")
         bars, *rest = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         angles, (normal, tangential, *places, trunk) = rest[: len(joints)], rest[len(joints) :]
         _draw_stances(bars, flat, parts)

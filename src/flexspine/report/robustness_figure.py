@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flexspine.report.caption import joined
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     FAINT,
     GREEN,
@@ -56,7 +57,7 @@ def plot_robustness(found: Robustness, animals: Mapping[str, Mapping[str, Any]])
             ],
             LETTERS,
         )
-        figure = Figure(figsize=(WIDTH, HEIGHT + LINE * len(details)), layout="constrained")
+        figure = Picture(figsize=(WIDTH, HEIGHT + LINE * len(details)), layout="constrained")
         axes = figure.subplots()
         for number, ((name, each), more) in enumerate(zip(found.animals.items(), own, strict=True)):
             color, marker = COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)]

@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from flexspine.errors import InputError
 from flexspine.report.caption import SIDES, joined, of_legs
 from flexspine.report.figure import _shares
+from flexspine.report.picture import Picture
 from flexspine.report.style import (
     ENERGY_COLORS,
     FAINT,
@@ -142,7 +143,7 @@ def start_figure(
     """Return a figure without panels: a title, room of a height (in), and a key at its foot."""
     details = joined(parts, LETTERS)
     height += 0.45 + LINE * (len(details) - (-len(key) // columns))
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Picture(figsize=(WIDTH, height), layout="constrained")
     add_title(figure, heading, details)
     figure.legend(
         [Line2D([], [], **look) for look in key.values()], list(key), loc="outside lower left",

@@ -10,6 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from flexspine.report.picture import Picture
 from flexspine.report.style import INK, LINE, add_title, themed
 from flexspine.studies.walk_map import MEASURES
 
@@ -38,7 +39,7 @@ def plot_walks(found: WalkMap) -> Figure:
             "bars: range of the locked spine's walks that last, which differ in noise alone",
         ]
         size = (0.9 + PANEL[0] * COLUMNS, 0.9 + PANEL[1] * rows + LINE * len(details))
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Picture(figsize=size, layout="constrained")
         panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False)
         for axes, name in zip(panels.flat, MEASURES, strict=True):
             _draw(axes, found, name)
