@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flexspine.control.leg_function import standing
     from flexspine.control.spine_comparison import SpineComparison, compare_spines
     from flexspine.control.stabilize import Stabilizer, stabilize
-    from flexspine.control.steering import Noise, SteeredRun, steer
+    from flexspine.control.steering import Noise, SteeredRun, Steering, steer
     from flexspine.control.trot import Trot, trot
     from flexspine.control.walk_measures import WalkSummary, summarize_walk
     from flexspine.control.walk_plan import Pace
@@ -102,6 +102,7 @@ _HOMES = {
     "Stability": "gaits.stability",
     "Stabilizer": "control.stabilize",
     "SteeredRun": "control.steering",
+    "Steering": "control.steering",
     "Sweep": "studies.sweep",
     "Terrain": "studies.wayfaring",
     "Trot": "control.trot",
@@ -205,6 +206,7 @@ __all__ = [
     "Stability",
     "Stabilizer",
     "SteeredRun",
+    "Steering",
     "Sweep",
     "Terrain",
     "Trot",

@@ -71,6 +71,17 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "spine_work": ("J", "work of changing the spine from phase to phase"),
 }
 
+
+def unit_and_meaning(name: str) -> tuple[str, str]:
+    """Unit and meaning of a variable; of one that a model of its own adds, by its name."""
+    words = name.replace("_", " ")
+    if name.endswith(("pitch", "angle")):
+        return VARIABLES.get(name, ("rad", words))
+    if name.endswith("_rate"):
+        return VARIABLES.get(name, ("rad/s", words))
+    return VARIABLES.get(name, ("", words))
+
+
 PHASE_CODES = {phase: code for code, phase in enumerate(PHASES)}
 
 
@@ -159,7 +170,11 @@ def to_dataset(
         grid, columns = grid[:0], {"phase": np.zeros(0)}
     labels = np.array(list(PHASE_CODES))[columns.pop("phase").astype(int)]
     data: dict[str, tuple[str, Array, dict[str, str]]] = {
-        name: ("time", column, {"units": VARIABLES[name][0], "long_name": VARIABLES[name][1]})
+        name: (
+            "time",
+            column,
+            dict(zip(("units", "long_name"), unit_and_meaning(name), strict=True)),
+        )
         for name, column in columns.items()
     }
     events = run.trajectory.events

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from flexspine.errors import InputError
-from flexspine.models.dataset import VARIABLES
+from flexspine.models.dataset import unit_and_meaning
 from flexspine.report.caption import joined
 from flexspine.report.picture import Picture
 from flexspine.report.style import INK, LINE, SMALL_SIZE, add_title, themed
@@ -65,7 +65,7 @@ class Scale(NamedTuple):
     def of(cls, name: str) -> Scale:
         """That of an apex coordinate."""
         variable = {"height": "com_y", "speed": "com_x_rate"}.get(name, name)
-        unit = VARIABLES[variable][0]
+        unit, _ = unit_and_meaning(variable)
         return cls(f"apex {name.replace('_', ' ')}", *READ.get(unit, (unit, 1.0)))
 
 

@@ -1,0 +1,80 @@
+"""The model of the guide: a body of three segments that flexspine does not know of."""
+
+from __future__ import annotations
+
+import runpy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flexspine import Model, load_model, plot_run, simulate, summarize, to_dataset
+from flexspine.models.legs import Leg
+from flexspine.models.model import Source
+
+GUIDE = Path(__file__).parents[2] / "docs" / "own" / "two_joint_bounder.py"
+
+
+def changed(parameters: Any, **changes: Any) -> Any:
+    return parameters.model_copy(update=changes)
+
+
+@pytest.fixture(scope="module")
+def animal() -> Model:
+    own = runpy.run_path(str(GUIDE))
+    leg = Leg(stiffness=6340.0, rest_length=0.36)
+    end = own["End"](mass=8.0, inertia=0.2, spine_offset=0.1, hip_offset=0.1, leg=leg)
+    middle = own["Middle"](mass=4.8, inertia=0.02, spine_offset=0.076)
+    spine = own["Joints"](stiffness=520.0)
+    pitches = {"fore_pitch": 0.1, "middle_pitch": 0.0, "hind_pitch": -0.1}
+    rates = {f"{name}_rate": -3.9 for name in pitches}
+    return Model(
+        name="two-joint",
+        kind=own["TWO_JOINT_BOUNDER"],
+        parameters=own["TwoJointParameters"](fore=end, middle=middle, hind=end, spine=spine),
+        apex={"height": 0.32, "speed": 4.5, **pitches, **rates},
+        touchdown={"fore": 0.46, "hind": 0.56},
+        source=Source(title="three segments, two joints"),
+    )
+
+
+def test_its_energy_is_kept(animal: Model) -> None:
+    run = simulate(animal)
+    assert run.outcome.completed
+    assert summarize(run).energy["relative_drift"] < 1e-13
+
+
+def test_its_hips_are_as_far_from_each_other_as_it_is_long(animal: Model) -> None:
+    straight = animal.with_values(apex=dict.fromkeys(("fore_pitch", "hind_pitch"), 0.0))
+    data = to_dataset(simulate(straight, duration=1e-3))
+    apart = data["fore_hip_x"].values[0] - data["hind_hip_x"].values[0]
+    assert apart == pytest.approx(2 * (0.1 + 0.1 + 0.076), abs=1e-14)
+
+
+def test_without_a_middle_and_with_one_joint_locked_it_is_the_flexible_bounder(
+    animal: Model,
+) -> None:
+    """A middle segment of nearly nothing between two springs is one spring half as stiff."""
+    published = load_model("kamimura2015-flexible")
+    parts = animal.parameters
+    end = changed(parts.fore, mass=10.4, inertia=0.36, spine_offset=0.138, hip_offset=0.138)
+    tiny = changed(parts.middle, mass=1e-6, inertia=1e-8, spine_offset=0.0)
+    spine = changed(parts.spine, stiffness=520.0)
+    light = replace(
+        animal,
+        parameters=changed(parts, fore=end, hind=end, middle=tiny, spine=spine),
+        apex={**published.apex, "middle_pitch": 0.0, "middle_pitch_rate": -3.89389870409466},
+        touchdown=published.touchdown,
+    )
+    mine, theirs = simulate(light), simulate(published)
+    assert mine.phases == theirs.phases
+    ends = [run.trajectory.events[0].time for run in (mine, theirs)]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-5)
+
+
+def test_its_data_and_figure_name_the_new_coordinate(animal: Model) -> None:
+    data = to_dataset(simulate(animal))
+    assert data["middle_pitch"].attrs == {"units": "rad", "long_name": "middle pitch"}
+    assert data["middle_pitch_rate"].attrs["units"] == "rad/s"
+    plot_run(data)
