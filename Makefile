@@ -1,10 +1,11 @@
-# make run: the main job.  make test: every check.  make bench: speed, as ratios.
+# make run: the main job.  make test: every check.  make docs: the documentation site.
+# make bench: speed, as ratios.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
 
-.PHONY: run test bench pictures clean
+.PHONY: run test docs bench pictures clean
 
 run: $(VENV)/.installed
 	$(BIN)/flexspine study --out $(OUT)
@@ -16,6 +17,13 @@ test: $(VENV)/.installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n auto --dist loadfile
+	$(MAKE) docs
+
+# Runs its examples and pages of code; fails on any warning, such as a broken link.
+docs: $(VENV)/.installed-dev
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/sphinx-build -W --keep-going -q -b doctest docs docs/_build/doctest
+	@echo "Open docs/_build/html/index.html"
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks
@@ -47,4 +55,4 @@ $(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
 	touch $@ $(VENV)/.installed
 
 clean:
-	rm -rf $(VENV) results .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) results docs/_build docs/gallery docs/reference .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
