@@ -12,8 +12,8 @@ run: $(VENV)/.installed
 	@echo "Look at $(OUT)/verdicts.md and $(OUT)/peak_grf_over_speed.png"
 
 test: $(VENV)/.installed-dev
-	$(BIN)/ruff check src tests benchmarks
-	$(BIN)/ruff format --check src tests benchmarks
+	$(BIN)/ruff check src tests benchmarks examples
+	$(BIN)/ruff format --check src tests benchmarks examples
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n auto --dist loadfile
