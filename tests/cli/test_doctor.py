@@ -54,6 +54,15 @@ def test_what_is_missing_is_told_with_how_to_get_it(
     assert "numpy 1.0" in done.stdout
 
 
+def test_an_ffmpeg_that_is_not_there_is_missing(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/no/such/ffmpeg")
+    done = cli("doctor")
+    assert done.returncode == 0
+    line = next(line for line in done.stdout.splitlines() if line[6:].startswith("video"))
+    assert line.startswith("- ")
+    assert "--no-animation" in line
+
+
 def test_a_package_that_is_needed_and_missing_is_wrong(
     cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,13 +25,16 @@ from flexspine import (
     to_dataset,
 )
 from flexspine.control.excerpt import excerpt
-from flexspine.errors import InputError
+from flexspine.errors import InputError, MachineError
 from flexspine.report.caption import describe
+from flexspine.report.film import write_film
 from flexspine.report.stage import draw_ground
 from flexspine.report.stick_figure import Scale
 from flexspine.report.way import Way
 from flexspine.studies.wayfaring import walk_over
 from tests.report.layout import assert_no_text_overlaps
+
+Make = Callable[[xr.Dataset, Path], None]
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +88,34 @@ def test_a_strip_is_drawn_for_every_preset(preset: Model, tmp_path: Path) -> Non
     strip(to_dataset(simulate(preset))).savefig(tmp_path / "strip.png")
     with Image.open(tmp_path / "strip.png") as image:
         assert image.size[0] > 600
+
+
+def _film(_data: xr.Dataset, path: Path) -> None:
+    write_film([np.zeros((8, 8, 3), np.uint8)], [path], fps=25, count=1)
+
+
+@pytest.mark.parametrize("make", [animate, _film])
+def test_without_ffmpeg_it_is_said_how_to_get_one(
+    data: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Make
+) -> None:
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "none"))
+    with pytest.raises(MachineError, match="no ffmpeg") as refused:
+        make(data, tmp_path / "run.mp4")
+    assert "--no-animation" in refused.value.remedy
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("make", [animate, _film])
+def test_a_full_disk_is_no_fault_of_the_place(
+    data: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Make
+) -> None:
+    def full(*_arguments: object, **_options: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Image.Image, "save", full)
+    with pytest.raises(OSError, match="No space left"):
+        make(data.isel(time=slice(0, 30)), tmp_path / "run.gif")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_format_that_is_not_known_is_refused(data: xr.Dataset, tmp_path: Path) -> None:

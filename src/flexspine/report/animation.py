@@ -14,8 +14,15 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 from PIL import Image
 
-from flexspine.errors import InputError, MachineError, OutputError, ParameterError
+from flexspine.errors import (
+    OUT_OF_SPACE,
+    InputError,
+    MachineError,
+    OutputError,
+    ParameterError,
+)
 from flexspine.report.caption import ending, heading
+from flexspine.report.film import video_encoder
 from flexspine.report.picture import Picture
 from flexspine.report.postures import Posture, postures
 from flexspine.report.robot_scene import RobotScene
@@ -93,7 +100,8 @@ def animate(
     part = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
     try:
         part.touch()
-        with themed(_encoder() if path.suffix.lower() == ".mp4" else None):
+        video = path.suffix.lower() == ".mp4"
+        with themed({"animation.ffmpeg_path": video_encoder()} if video else None):
             made: type[Shown] = RobotScene if robot else Scene
             scene = made(dataset, times, slow_down)
             writer = _writer(part, fps, scene)
@@ -109,6 +117,8 @@ def animate(
             f"the video encoder failed with status {error.returncode}", "write a .gif instead"
         ) from error
     except OSError as error:
+        if error.errno in OUT_OF_SPACE:
+            raise
         raise OutputError(
             f"cannot write '{path}' ({error.strerror})", "give a place that can be written to"
         ) from error
@@ -173,15 +183,6 @@ def _writer(path: Path, fps: int, scene: Shown) -> AbstractMovieWriter:
         scene.show(posture)
         some.append(_picture(scene.figure))
     return GifWriter(fps, some, bend_palette(32))
-
-
-def _encoder() -> dict[str, Any]:
-    import imageio_ffmpeg
-
-    try:
-        return {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
-    except RuntimeError as error:
-        raise MachineError("no video encoder was found", "write a .gif instead") from error
 
 
 def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from PIL import Image
 
-from flexspine.errors import InputError, MachineError, OutputError
+from flexspine.errors import OUT_OF_SPACE, InputError, MachineError, OutputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,6 +64,8 @@ def write_film(
         for path, part in parts.items():
             part.replace(path)
     except OSError as failure:
+        if failure.errno in OUT_OF_SPACE:
+            raise
         raise OutputError(
             f"cannot write '{paths[0].parent}' ({failure.strerror or failure})",
             "give a place that can be written to",
@@ -106,6 +110,7 @@ class _Video:
 
         try:
             if self._writer is None:
+                video_encoder()
                 size = picture.shape[1], picture.shape[0]
                 self._writer = imageio_ffmpeg.write_frames(
                     str(self._path), size, fps=self._fps, codec="libx264", quality=7,
@@ -119,3 +124,18 @@ class _Video:
     def close(self) -> None:
         if self._writer is not None:
             self._writer.close()
+
+
+def video_encoder() -> str:
+    """Where ffmpeg is. Raises `MachineError` if it is nowhere."""
+    import imageio_ffmpeg
+
+    found: str | None = None
+    with suppress(RuntimeError):
+        found = shutil.which(imageio_ffmpeg.get_ffmpeg_exe())
+    if found is None:
+        raise MachineError(
+            "there is no ffmpeg to make videos with",
+            "pip install imageio-ffmpeg, set IMAGEIO_FFMPEG_EXE to one, or give --no-animation",
+        )
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import re
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -121,9 +122,12 @@ def _video() -> tuple[bool | None, str]:
     import imageio_ffmpeg
 
     try:
-        return True, str(imageio_ffmpeg.get_ffmpeg_exe())
+        found = shutil.which(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError:
-        return None, "no ffmpeg: animations as GIF alone; pip install imageio-ffmpeg"
+        found = None
+    if found is None:
+        return None, "no ffmpeg: no videos, give --no-animation; or pip install imageio-ffmpeg"
+    return True, found
 
 
 def _opengl() -> tuple[bool | None, str]:
