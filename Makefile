@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
+SITE := docs/conf.py docs/_sphinx docs/own
 
 .PHONY: run test docs bench pictures clean
 
@@ -12,8 +13,8 @@ run: $(VENV)/.installed
 	@echo "Look at $(OUT)/verdicts.md and $(OUT)/peak_grf_over_speed.png"
 
 test: $(VENV)/.installed-dev
-	$(BIN)/ruff check src tests benchmarks examples
-	$(BIN)/ruff format --check src tests benchmarks examples
+	$(BIN)/ruff check src tests benchmarks examples $(SITE)
+	$(BIN)/ruff format --check src tests benchmarks examples $(SITE)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n auto --dist loadfile

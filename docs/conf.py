@@ -14,7 +14,7 @@ from flexspine import __version__  # noqa: E402
 
 project = "flexspine"
 author = "flexspine maintainers"
-copyright = author  # noqa: A001
+copyright = author
 release = version = __version__
 
 extensions = [
@@ -24,6 +24,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "sphinx_design",
+    "sphinx_gallery.gen_gallery",
     "mathml",
     "generated_pages",
 ]

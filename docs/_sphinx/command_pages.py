@@ -14,9 +14,10 @@ from flexspine.cli.app import app
 
 HEAD = """# Command line
 
-What `flexspine VERB --help` prints, on one page. Units are SI and radians unless an option says otherwise.
-Exit codes: 0 done; 1 the run ended without its goal (it fell, no gait found); 2 bad input; 3 the machine failed
-(disk, worker, missing extra); 130 interrupted. `--json` prints one JSON object on stdout and nothing else; messages go to stderr.
+What `flexspine VERB --help` prints, on one page. Units are SI and radians unless an option says
+otherwise. Exit codes: 0 done; 1 the run ended without its goal (it fell, no gait found); 2 bad
+input; 3 the machine failed (disk, worker, missing extra); 130 interrupted. `--json` prints one JSON
+object on stdout and nothing else; messages go to stderr.
 
 `flexspine --install-completion` teaches your shell to complete verbs, options and names.
 """
@@ -26,7 +27,8 @@ def command_pages() -> dict[str, str]:
     """Return the page of all verbs."""
     parts = [HEAD]
     for path, command in leaves(typer.main.get_command(app), ("flexspine",)):
-        parts += [f"## {' '.join(path)}\n", described(command), usage(path, command), taken(command)]
+        parts.append(f"## {' '.join(path)}\n")
+        parts += [described(command), usage(path, command), taken(command)]
     return {"cli.md": "\n".join(parts)}
 
 
@@ -63,6 +65,8 @@ def taken(command: Any) -> str:
         named = each.param_type_name == "option"
         names = [*each.opts, *each.secondary_opts] if named else [str(each.name).upper()]
         default = each.default
+        if default is True and named and each.secondary_opts:
+            default = each.opts[0]
         told = "" if default in (None, False, ()) or callable(default) else str(default)
         rows.append((", ".join(map(code, names)), _plain(getattr(each, "help", "") or ""), told))
     return table(("option", "", "default"), rows)

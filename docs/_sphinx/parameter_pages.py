@@ -1,7 +1,8 @@
-"""Every parameter with unit and bounds, and every preset with its values and where they are from."""
+"""Every parameter with unit and bounds, and every preset with its values and their sources."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from tables import code, table
@@ -20,15 +21,23 @@ from flexspine.parameters import ParameterSet, quantities, values
 
 PARAMETERS = """# Parameters
 
-All of them by the dotted name that `--set`, TOML files and the functions of the library take, with unit and bounds,
-as the code declares them. `--set NAME=VALUE` sets one from the command line; what is out of bounds is refused.
-A dash in the column of defaults marks a value that has to be given. *Shown by* `flexspine presets NAME`: the values of a preset.
+All of them by the dotted name that `--set`, TOML files and the functions of the library take, with
+unit and bounds, as the code declares them. `--set NAME=VALUE` sets one from the command line; what
+is out of bounds is refused. A dash in the column of defaults marks a value that has to be given.
+`flexspine presets NAME` prints the values of a preset.
 """
 
 PRESETS = """# Presets
 
-What comes with flexspine, value by value. A file of your own that names one as its `base` changes what it likes:
-see {doc}`../extending`.
+What comes with flexspine, value by value. A file of your own that names one as its `base` changes
+what it likes: see {doc}`../extending`.
+"""
+
+STARTS = """## Starts
+
+`--apex NAME=VALUE` sets a coordinate of the apex that a run starts from, `--touchdown fore=ANGLE`
+and `--touchdown hind=ANGLE` the angles (rad, between -pi/2 and pi/2) from the vertical at which legs
+touch down, foot ahead of the hip positive.
 """
 
 ROBOT_PARTS = (
@@ -46,15 +55,12 @@ def parameter_pages() -> dict[str, str]:
     for kind in KINDS.values():
         parts += [f"## {kind.name}\n", f"{_capital(kind.title)}. Source: {kind.source}.\n"]
         parts.append(declared(kind.parameters))
-    parts.append(
-        "## Starts\n\n`--apex NAME=VALUE` sets a coordinate of the apex that a run starts from, `--touchdown fore=ANGLE` "
-        "and `--touchdown hind=ANGLE` the angles (rad) from the vertical at which legs touch down, foot ahead of the hip positive, "
-        "between -pi/2 and pi/2.\n"
-    )
+    parts.append(STARTS)
     parts.append("## Articulated robots\n")
     for title, prefix, kind in ROBOT_PARTS:
         parts += [f"### {title}\n", declared(kind, prefix)]
     parts += ["## Walks in space\n", declared(Gains)]
+    parts.append("How the planar robot trots, `gait.speed` and its like, is in {doc}`../robot`.\n")
     return {
         "parameters.md": "\n".join(parts),
         "presets.md": "\n".join([PRESETS, *map(_preset, preset_names()), _robots(), _walks()]),
@@ -97,23 +103,23 @@ def _preset(name: str) -> str:
 
 
 def _robots() -> str:
-    parts = []
-    for name in robot_names():
-        robot = load_robot(name)
-        rows = ((code(key), f"{value:g}") for key, value in robot.numbers.items())
-        told = f"## {name}\n\n{robot.source.title}. See {{doc}}`../robot`.\n\n{_sources(robot.source)}\n"
-        parts.append(f"{told}{table(('name', 'value (SI)'), rows)}\n")
-    return "\n".join(parts)
+    return "\n".join(
+        _numbers(name, "robot", robot.source, robot.numbers)
+        for name, robot in ((name, load_robot(name)) for name in robot_names())
+    )
 
 
 def _walks() -> str:
-    parts = []
-    for robot, name in ((robot, name) for robot in robot_names() for name in walk_names(robot)):
-        walk = load_walk(name, robot)
-        rows = ((code(key), f"{value:g}") for key, value in values(walk.gains).items())
-        told = f"## {name}\n\n{walk.source.title}. See {{doc}}`../space`.\n\n{_sources(walk.source)}\n"
-        parts.append(f"{told}{table(('name', 'value (SI)'), rows)}\n")
-    return "\n".join(parts)
+    walks = [load_walk(name, robot) for robot in robot_names() for name in walk_names(robot)]
+    return "\n".join(
+        _numbers(walk.name, "space", walk.source, values(walk.gains)) for walk in walks
+    )
+
+
+def _numbers(name: str, page: str, source: Any, numbers: Mapping[str, float]) -> str:
+    rows = ((code(key), f"{value:g}") for key, value in numbers.items())
+    told = f"## {name}\n\n{source.title}. See {{doc}}`../{page}`.\n\n{_sources(source)}\n"
+    return f"{told}{table(('name', 'value (SI)'), rows)}\n"
 
 
 def _sources(source: Any) -> str:

@@ -12,8 +12,8 @@ from sphinx_gallery.scrapers import figure_rst
 class PicturesOnDisk:
     """A scraper of sphinx-gallery: every PNG that a block of an example wrote is its picture."""
 
-    def __call__(self, block: Any, block_vars: dict[str, Any], gallery: dict[str, Any]) -> str:
-        """Move the pictures to where the gallery wants them, and return the text that shows them."""
+    def __call__(self, _block: Any, block_vars: dict[str, Any], gallery: dict[str, Any]) -> str:
+        """Move the pictures to where the gallery wants them, and return what shows them."""
         places = block_vars["image_path_iterator"]
         taken = []
         for picture in sorted(Path(block_vars["src_file"]).parent.glob("*.png")):

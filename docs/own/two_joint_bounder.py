@@ -60,6 +60,7 @@ class TwoJointParameters(ParameterSet):
 # Geometry: every CoM and hip is the whole CoM plus lever arms times the directions of the segments
 
 PARTS = ("fore", "middle", "hind")
+PITCHES = tuple(f"{part}_pitch" for part in PARTS)
 ANGLES = sp.symbols("theta_f theta_m theta_h", real=True)
 RATES = sp.symbols("thetadot_f thetadot_m thetadot_h", real=True)
 MASSES = sp.symbols("m_f m_m m_h", real=True)
@@ -86,7 +87,8 @@ def body(features: Features) -> Body:
     """Energies and hips."""
     definitions = {M: sum(MASSES)}
     for i, mean in enumerate(MEAN):
-        definitions[mean] = sum(m * arms[i] for m, arms in zip(MASSES, FROM_MIDDLE, strict=True)) / M
+        moment = sum(m * arms[i] for m, arms in zip(MASSES, FROM_MIDDLE, strict=True))
+        definitions[mean] = moment / M
     # T = 1/2 m v^2 + 1/2 sum A_ij cos(theta_i - theta_j) theta_i' theta_j', with constant A
     kinetic = M * (X_RATE**2 + Y_RATE**2) / 2
     for i in range(3):
@@ -102,11 +104,8 @@ def body(features: Features) -> Body:
     rates = (RATES[0] - RATES[1], RATES[1] - RATES[2])
     letters = (("mass", MASSES), ("inertia", INERTIAS), ("spine_offset", OFFSETS))
     return Body(
-        coordinates={
-            f"{part}_pitch": pair
-            for part, pair in zip(PARTS, zip(ANGLES, RATES, strict=True), strict=True)
-        },
-        mirror=dict(zip((f"{p}_pitch" for p in PARTS), (f"{p}_pitch" for p in PARTS[::-1]), strict=True)),
+        coordinates=dict(zip(PITCHES, zip(ANGLES, RATES, strict=True), strict=True)),
+        mirror=dict(zip(PITCHES, reversed(PITCHES), strict=True)),
         parameters={
             **{f"{part}.{name}": row[i] for i, part in enumerate(PARTS) for name, row in letters},
             "fore.hip_offset": H_F,
