@@ -36,8 +36,8 @@ what it likes: see {doc}`../extending`.
 STARTS = """## Starts
 
 `--apex NAME=VALUE` sets a coordinate of the apex that a run starts from, `--touchdown fore=ANGLE`
-and `--touchdown hind=ANGLE` the angles (rad, between -pi/2 and pi/2) from the vertical at which legs
-touch down, foot ahead of the hip positive.
+and `--touchdown hind=ANGLE` the angles (rad, between -pi/2 and pi/2) from the vertical at which
+legs touch down, foot ahead of the hip positive.
 """
 
 ROBOT_PARTS = (
