@@ -419,6 +419,20 @@ def test_two_that_wait_for_a_third_do_not_both_begin(
         Store(out, plan).opened().__enter__()
 
 
+def test_a_disk_without_locks_is_not_taken_for_another_process(
+    whole: Whole, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some network disks have none."""
+
+    def none(_file: Any, _how: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    with pytest.raises(OutputError, match="No locks available") as refused:
+        sweep(whole.plan, tmp_path / "out")
+    assert "disk of this machine" in refused.value.remedy
+
+
 # What is somebody else's.
 
 

@@ -87,11 +87,17 @@ class Store:
             lock = (self.path / LOCK).open("a")
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+            except BlockingIOError:
                 lock.close()
                 raise OutputError(
                     f"another process is at work in '{self.path}'",
                     "wait for it, or give another directory",
+                ) from None
+            except OSError as failure:
+                lock.close()
+                raise OutputError(
+                    f"'{self.path}' cannot be locked ({failure.strerror})",
+                    "give a directory on a disk of this machine",
                 ) from None
             try:
                 if os.path.samestat(os.fstat(lock.fileno()), (self.path / LOCK).stat()):
