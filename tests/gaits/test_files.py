@@ -45,6 +45,18 @@ def test_what_is_no_gait_is_refused(tmp_path: Path, content: str) -> None:
         load_gait(tmp_path / "gait.json")
 
 
+def test_a_gait_of_another_form_is_not_misread(tmp_path: Path) -> None:
+    file = tmp_path / "gait.json"
+    save_gait(examine(load_model("kamimura2015-locked")), file)
+    record = json.loads(file.read_text())
+    file.write_text(json.dumps({**record, "schema_version": record["schema_version"] + 1}))
+    with pytest.raises(PresetError, match="schema_version 2"):
+        load_gait(file)
+    del record["schema_version"]  # as people write one by hand
+    file.write_text(json.dumps(record))
+    assert load_gait(file).confirmed
+
+
 def test_a_step_that_was_cut_off_is_made_again(tmp_path: Path) -> None:
     gait, store = examine(load_model("kamimura2015-rigid")), tmp_path / "trace.jsonl"
     whole = trace_branch(gait, bounds=BOUNDS, store=str(store))

@@ -21,7 +21,7 @@ import pytest
 
 from flexspine import Sweep, read_plan, sweep
 from flexspine.cli import app
-from flexspine.errors import OutputError
+from flexspine.errors import InputError, OutputError
 from flexspine.studies.store import Store
 from tests.studies.test_sweep import files_of, processes_of, rows_of
 
@@ -459,6 +459,16 @@ def test_a_directory_with_anything_in_it_is_something_else(
         sweep(whole.plan, tmp_path / "other")
     assert [path.name for path in (tmp_path / "other").iterdir()] == [name]
     assert (tmp_path / "other" / name).read_text() == "precious"
+
+
+def test_a_manifest_of_another_form_is_not_misread(whole: Whole, tmp_path: Path) -> None:
+    with Store(tmp_path / "out", read_plan(whole.plan)).opened():
+        pass
+    file = tmp_path / "out" / "manifest.json"
+    manifest = json.loads(file.read_text())
+    file.write_text(json.dumps({**manifest, "schema_version": manifest["schema_version"] + 1}))
+    with pytest.raises(InputError, match="schema_version 2"):
+        sweep(whole.plan, tmp_path / "out")
 
 
 def test_notes_next_to_the_rows_do_no_harm(whole: Whole, tmp_path: Path) -> None:

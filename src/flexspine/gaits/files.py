@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from flexspine._version import check_schema
 from flexspine.errors import OUT_OF_SPACE, InputError, OutputError, PresetError
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.gait_record import gait_record
@@ -44,6 +45,7 @@ def load_gait(path: str | Path) -> Gait:
     """
     record = _only_gait(str(path), _parse(str(path)))
     try:
+        check_schema(record, "the gait")
         model = Model(
             name=str(record.get("preset", Path(path).stem)),
             kind=find_kind(str(record["model"])),

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import IO, Any
 from urllib.parse import quote
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import SCHEMA_VERSION, __version__, check_schema
 from flexspine.errors import OUT_OF_SPACE, InputError, OutputError
 from flexspine.parameters import shortened
 from flexspine.studies.parts import Part, read_about
@@ -213,6 +213,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
     known = manifest if isinstance(manifest, dict) else {}
     if not all(isinstance(known.get(entry), kind) for entry, kind in ENTRIES.items()):
         raise InputError(f"the manifest in '{path}' is damaged", ANEW)
+    check_schema(known, f"the manifest in '{path}'")
     return known
 
 
