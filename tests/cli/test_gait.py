@@ -220,6 +220,7 @@ BAD = {
     "unknown parameter": (["--set", "spine.stifness=3"], "spine.stiffness"),
     "unknown quantity": (["--fix", "heigt=0.32"], "height"),
     "too few fixed": (["--energy", "290", "--fix", "height=0.32"], "families of 1 dimension"),
+    "too much free": (["--free", "spine.stiffness=200:300"], "fewer parameters free"),
     "too many fixed": (
         ["--energy", "290", "--height", "0.32", "--speed", "4.5", "--fix", "speed=4.4"],
         "1 too many",

@@ -183,10 +183,11 @@ def _own_values(model: Model, tolerance: float) -> dict[str, float]:
 def _check_count(problem: Problem) -> None:
     surplus = problem.surplus
     if surplus > 0:
+        freed = "touchdown.fore, or set fewer parameters free"
         raise ParameterError(
             f"gaits with fixed {_listed(problem.fixed)} come in families of {surplus} dimension"
             + "s" * (surplus > 1),
-            "fix more, such as energy, height and mean_speed",
+            f"fix more, such as {freed if problem.free else 'energy, height and mean_speed'}",
         )
     if surplus < 0:
         raise ParameterError(
