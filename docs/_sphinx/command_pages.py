@@ -19,7 +19,8 @@ otherwise. Exit codes: 0 done; 1 the run ended without its goal (it fell, no gai
 input; 3 the machine failed (disk, worker, missing extra); 130 interrupted. `--json` prints one JSON
 object on stdout and nothing else; messages go to stderr.
 
-`flexspine --install-completion` teaches your shell to complete verbs, options and names.
+`flexspine --install-completion` teaches your shell to complete verbs, options and the names of
+presets, robots, walks and parameters.
 """
 
 
@@ -64,10 +65,10 @@ def taken(command: Any) -> str:
             continue
         named = each.param_type_name == "option"
         names = [*each.opts, *each.secondary_opts] if named else [str(each.name).upper()]
-        default = each.default
+        default = each.show_default if isinstance(each.show_default, str) else each.default
         if default is True and named and each.secondary_opts:
             default = each.opts[0]
-        told = "" if default in (None, False, ()) or callable(default) else str(default)
+        told = "" if default is None or default is False or callable(default) else str(default)
         rows.append((", ".join(map(code, names)), _plain(getattr(each, "help", "") or ""), told))
     return table(("option", "", "default"), rows)
 

@@ -85,7 +85,7 @@ def test_a_fall_is_exit_code_1_with_advice(cli: Cli) -> None:
 
 
 def test_a_time_can_be_given_instead_of_strides(cli: Cli) -> None:
-    record = json.loads(cli("bound", "--duration", "0.1", "--json").stdout)
+    record = json.loads(cli("bound", "--seconds", "0.1", "--json").stdout)
     assert record["duration"] == 0.1
     assert record["period"] is None
 
@@ -129,8 +129,8 @@ BAD = {
     "unknown option": (["--strid", "3"], "--strid"),
     "no whole number": (["--strides", "two"], "--strides"),
     "no strides": (["--strides", "0"], "--strides"),
-    "both lengths": (["--strides", "2", "--duration", "1"], "one of them"),
-    "negative time": (["--duration", "-1"], "duration"),
+    "both lengths": (["--strides", "2", "--seconds", "1"], "one of them"),
+    "negative time": (["--seconds", "-1"], "--seconds"),
     "tolerance": (["--tolerance", "7"], "tolerance"),
     "a group": (["--set", "spine=3"], "spine.stiffness"),
     "a huge start": (["--apex", "speed=1e200"], "speed"),
@@ -226,7 +226,7 @@ def test_an_interrupt_while_starting_is_no_traceback(tmp_path: Path, delay: floa
 
 
 def test_pictures_of_an_earlier_run_do_not_stay(cli: Cli, tmp_path: Path) -> None:
-    assert cli("bound", "--duration", "0.05", "--out", "results").returncode == 0
+    assert cli("bound", "--seconds", "0.05", "--out", "results").returncode == 0
     assert (tmp_path / "results" / "animation.gif").exists()
     assert cli("bound", "--out", "results", "--no-animation").returncode == 0
     assert not (tmp_path / "results" / "animation.gif").exists()

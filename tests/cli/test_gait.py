@@ -136,7 +136,7 @@ def test_a_period_of_two_strides_is_run_as_a_whole(cli: Cli, found: Found, tmp_p
     saved = {**published(found.record["gaits"]), "strides": 2}
     (tmp_path / "two.json").write_text(json.dumps(saved))
     assert json.loads(cli("bound", "--gait", "two.json", "--json").stdout)["strides"] == 2
-    run = json.loads(cli("bound", "--gait", "two.json", "--duration", "0.1", "--json").stdout)
+    run = json.loads(cli("bound", "--gait", "two.json", "--seconds", "0.1", "--json").stdout)
     assert run["duration"] == 0.1
 
 

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
-from flexspine.cli.options import Assignments, Json
-from flexspine.cli.output import counting, print_json
+from flexspine.cli import completion
+from flexspine.cli.interrupts import interruptible
+from flexspine.cli.options import Assignments, Json, Processes, Scheduler, output_directory
+from flexspine.cli.output import counting, print_json, steps
 from flexspine.cli.starts import start_of
-from flexspine.cli.sweep import Processes, Scheduler, count_of, unfinished_is_kept
+from flexspine.cli.sweep import count_of, unfinished_is_kept
 from flexspine.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 # The preset whose gaits are drawn if none is given.
 EXAMPLE = "scout2"
 
-Out = Annotated[Path, typer.Option(help="Keep rows, tables and the figure in this directory.")]
+Out = Annotated[Path, output_directory("rows, tables and the figure")]
 
 
 def basin(
@@ -36,8 +38,10 @@ def basin(
     preset: Annotated[
         list[str] | None,
         typer.Option(
-            help="A preset or a TOML file that starts in a gait; repeat it (default: scout2, and "
-            "for contrast three unstable gaits of the same robot)."
+            metavar="NAME",
+            help="A preset (see 'flexspine presets') or a TOML file; repeat it.",
+            show_default="scout2 and, for contrast, three unstable gaits of that robot",
+            autocompletion=completion.presets,
         ),
     ] = None,
     gait: Annotated[
@@ -49,14 +53,20 @@ def basin(
         list[str] | None,
         typer.Option(
             metavar="NAME:AMOUNT",
-            help="An apex coordinate to vary and how far each way, e.g. height:0.1; give two "
-            "(default pitch:0.8 and pitch_rate:8, or fore_pitch:0.3 and hind_pitch:0.3 of a body "
-            "that bends).",
+            help="An apex coordinate to vary and how far each way (SI), e.g. height:0.1; give two.",
+            show_default="pitch:0.8 and pitch_rate:8, or fore_pitch:0.3 and hind_pitch:0.3 of a "
+            "body that bends",
         ),
     ] = None,
-    points: Annotated[int | None, typer.Option(min=2, help="Values of each (default 100).")] = None,
+    points: Annotated[
+        int | None,
+        typer.Option(min=2, metavar="N", help="How many values of each.", show_default="100"),
+    ] = None,
     strides: Annotated[
-        int | None, typer.Option(min=1, help="Strides to be survived (default 100).")
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="How many strides a run has to make.", show_default="100"
+        ),
     ] = None,
     keep_energy: Annotated[
         bool,
@@ -69,20 +79,24 @@ def basin(
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> int:
-    """Run many starts about a gait, and see how long they last and whether they come to it.
+    """See which starts about a gait last, and which come to it.
 
     Starts lie on a slice through the apex of the gait. Runs keep their energy, so that one with
     another energy could come to a neighbouring gait only: the apex speed makes up for what varies.
     Units are SI and radians. Interrupted or killed, the same command goes on; 'flexspine rerun DIR'
-    repeats it. Exit code 0: done; 1: a start is no gait, or none was found; 2: bad input; 3: the
-    machine or its workers failed; 130: interrupted.
+    repeats it.
+
+    Exit code 0: done; 1: a start is no gait, or none was found; 2: bad input; 3: the machine or its
+    workers failed; 130: interrupted.
 
     Examples:
-        flexspine basin --out results/basin
+        flexspine basin --out basin
 
-        flexspine basin --preset scout2 --over height:0.1 --over pitch:0.5 --points 200 --out DIR
+        flexspine basin --preset scout2 --over height:0.1 --over pitch:0.5 --out b2
 
-        flexspine basin --gait found/gait-1.json --strides 20 --out DIR --json
+        flexspine gait --speed 4.25 --symmetric --out found
+
+        flexspine basin --gait found/gait-1.json --strides 20 --out near --json
     """
     from flexspine.report.basin_figure import plot_basin
     from flexspine.studies.basin import POINTS, STRIDES, basin_plan, read_basins
@@ -145,7 +159,10 @@ def _gaits(
     from flexspine.studies.basin import example_gaits
 
     if not presets and not files and not set_:
-        return example_gaits()
+        interruptible()
+        with steps() as progress:
+            progress.begin("looking for gaits")
+            return example_gaits()
     found: dict[str, Gait] = {}
     places: list[tuple[str, Path | None]] = [(name, None) for name in presets or []]
     places += [(file.stem, file) for file in files or []]

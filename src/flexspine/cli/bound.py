@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from math import inf
 from typing import Annotated, Any
 
 import typer
@@ -33,15 +34,21 @@ def bound(
     touchdown: Touchdown = None,
     strides: Annotated[
         int | None,
-        typer.Option(min=1, help="How many strides to run (default: 1, or the period of --gait)."),
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="How many strides to run.",
+            show_default="1, or the period of --gait",
+        ),
     ] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Run this many seconds instead of counting strides.")
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="Run this long, in s, instead of counting strides."),
     ] = None,
     tolerance: Tolerance = None,
     interval: Annotated[
         float | None,
-        typer.Option(help="Seconds between samples in the written data (default 0.001)."),
+        typer.Option(help="Time between samples of the written data, in s.", show_default="0.001"),
     ] = None,
     out: RunDirectory = None,
     animation: Animation = True,
@@ -49,23 +56,32 @@ def bound(
 ) -> int:
     """Simulate bounding from an apex, or a saved gait.
 
-    Units are SI and radians. Exit code 0: all strides done; 1: the run ended otherwise, for
-    example by a fall; 2: bad input; 3: the machine failed; 130: interrupted.
+    Units are SI and radians.
+
+    Exit code 0: all strides done; 1: the run ended otherwise, for example by a fall; 2: bad input;
+    3: the machine failed; 130: interrupted.
 
     Examples:
-        flexspine bound --strides 3 --out results
+        flexspine bound --strides 3 --out run
 
         flexspine bound --set spine.stiffness=240 --apex height=0.33 --json
 
-        flexspine bound --gait results/gait-1.json --strides 10
+        flexspine gait --out found && flexspine bound --gait found/gait-1.json
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.gaits.record import run_record
     from flexspine.models.dataset import DEFAULT_INTERVAL, check_interval
+    from flexspine.models.model import check_between
     from flexspine.models.presets import load_model
     from flexspine.models.simulation import DEFAULT_TOLERANCE, simulate
 
     interruptible()
+    if seconds is not None and strides is not None:
+        raise InputError("--seconds and --strides are both given", "leave one of them")
+    if interval is not None and out is None:
+        raise InputError("--interval is given without --out", "give --out, where the data goes")
+    if seconds is not None:
+        check_between("--seconds", seconds, 0, inf)
     step = DEFAULT_INTERVAL if interval is None else interval
     check_interval(step)
     if gait is not None:
@@ -76,7 +92,7 @@ def bound(
 
         saved = load_gait(gait)
         model = saved.model
-        if duration is None:
+        if seconds is None:
             strides = strides or saved.strides
     else:
         model = load_model(
@@ -92,7 +108,7 @@ def bound(
         run = simulate(
             model,
             strides=strides,
-            duration=duration,
+            duration=seconds,
             tolerance=DEFAULT_TOLERANCE if tolerance is None else tolerance,
         )
         record = run_record(run)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     Assignments,
@@ -19,6 +20,7 @@ from flexspine.cli.options import (
     Symmetric,
     check_number,
     numbers,
+    output_directory,
 )
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.cli.starts import starting_gait
@@ -42,6 +44,8 @@ def branch(
         typer.Option(
             help="What to follow the gait in: mean_speed, energy, an apex coordinate such as "
             "height, touchdown.fore, touchdown.hind, or a parameter such as spine.stiffness.",
+            metavar="NAME",
+            autocompletion=completion.quantities,
         ),
     ] = "mean_speed",
     gait: GaitFile = None,
@@ -51,8 +55,9 @@ def branch(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="A quantity to keep, as NAME or NAME=VALUE (default: energy, height and "
-            "mean_speed, without what is followed).",
+            help="A quantity to keep, as NAME or NAME=VALUE; repeat it.",
+            show_default="energy, height and mean_speed, without what is followed",
+            autocompletion=completion.quantities,
         ),
     ] = None,
     free: Annotated[
@@ -60,33 +65,32 @@ def branch(
         typer.Option(
             metavar="NAME",
             help="A parameter that may change as well, such as legs.extension to make good what "
-            "dampers take.",
+            "dampers take; repeat it.",
+            autocompletion=completion.quantities,
         ),
     ] = None,
     symmetric: Symmetric = None,
     longest_step: Annotated[
         float | None,
-        typer.Option(help="Longest step along the branch, in natural units (default 0.05)."),
+        typer.Option(help="Longest step along the branch, in natural units.", show_default="0.05"),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Write the branch and a figure into this directory.")
-    ] = None,
+    out: Annotated[Path | None, output_directory("the branch and a figure")] = None,
     json: Json = False,
 ) -> int:
-    """Follow a gait both ways until the branch ends or leaves --from to --to.
+    """Follow a gait while a quantity or a parameter changes.
 
-    It goes around folds, and marks where stability, symmetry or the order of contacts changes.
-    Starts from a saved gait or from that of a preset. With --out, an interrupted branch goes on
-    where it was when the same command is given again. Units are SI and radians. Exit code 0:
-    followed to both ends; 1: no gait to start from; 2: bad input; 3: the machine failed;
-    130: interrupted.
+    It is followed both ways until the branch ends or leaves --from to --to. It goes around folds,
+    and marks where stability, symmetry or the order of contacts changes. Starts from a saved gait
+    or from that of a preset. With --out, an interrupted branch goes on where it was when the same
+    command is given again. Units are SI and radians.
+
+    Exit code 0: followed to both ends; 1: no gait to start from; 2: bad input; 3: the machine
+    failed; 130: interrupted.
 
     Examples:
-        flexspine branch --from 3.7 --to 4.6 --out results
+        flexspine branch --from 3.7 --to 4.6 --out branch
 
-        flexspine branch --gait results/gait-1.json --over spine.stiffness --from 200 --to 300
-
-        flexspine branch --over energy --keep height --keep mean_speed=4.4 --from 280 --to 300
+        flexspine branch --over spine.stiffness --from 200 --to 300 --json
 
         flexspine branch --over spine.damping --free legs.extension --from 0 --to 8
     """
@@ -97,7 +101,8 @@ def branch(
 
     interruptible()
     step = LONGEST_STEP if longest_step is None else longest_step
-    check_number("--longest-step", step)
+    for option, value in (("--from", low), ("--to", high), ("--longest-step", step)):
+        check_number(option, value)
     if step <= 0:
         raise ParameterError(f"--longest-step = {step:g} is not usable", "give a number above zero")
     with ExitStack() as stack:

@@ -8,14 +8,16 @@ from flexspine._version import SCHEMA_VERSION
 from flexspine.cli.options import Json
 from flexspine.cli.output import print_json
 
-app = typer.Typer(help="Compiled code kept between starts.", no_args_is_help=True)
+app = typer.Typer(help="Clear the compiled code that is kept between starts.", no_args_is_help=True)
 
 
 @app.command("clear")
 def clear(json: Json = False) -> None:
     """Delete all compiled code; the next run compiles again.
 
-    Example:
+    Exit code 0: done; 3: the machine failed; 130: interrupted.
+
+    Examples:
         flexspine cache clear
     """
     from flexspine.hybrid.cache import clear_cache

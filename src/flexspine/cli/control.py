@@ -15,11 +15,13 @@ from flexspine.cli.options import (
     Json,
     Preset,
     RunDirectory,
+    Seed,
     check_number,
 )
 from flexspine.cli.output import print_json, steps
 from flexspine.cli.starts import starting_gait
 from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
+from flexspine.errors import InputError
 
 # Spectral radii that differ by less are the same.
 ON_LEVEL = 1e-6
@@ -33,12 +35,24 @@ def control(
     method: Method = "lqr",
     once: Once = False,
     effort: Effort = None,
-    strides: Annotated[int, typer.Option(min=1, help="How many strides to run.")] = 1000,
+    strides: Annotated[
+        int, typer.Option(min=1, metavar="N", help="How many strides to run.")
+    ] = 1000,
     sensing: Annotated[
-        float, typer.Option(min=0, help="Gaussian noise on the measured apex, in natural units.")
+        float,
+        typer.Option(
+            min=0,
+            metavar="SHARE",
+            help="Gaussian noise on the measured apex, in natural units.",
+        ),
     ] = 0.0,
     acting: Annotated[
-        float, typer.Option(min=0, help="Gaussian noise on what is steered, relative: 0.01 is 1 %.")
+        float,
+        typer.Option(
+            min=0,
+            metavar="SHARE",
+            help="Gaussian noise on what is steered, relative: 0.01 is 1 %.",
+        ),
     ] = 0.0,
     uniform: Annotated[
         bool, typer.Option("--uniform", help="Draw --acting evenly from -VALUE to VALUE instead.")
@@ -46,25 +60,27 @@ def control(
     push: Annotated[
         float, typer.Option(help="A push forward at the first apex, in N s (backward if negative).")
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of the noise.")] = 0,
+    seed: Seed = 0,
     out: RunDirectory = None,
     animation: Animation = True,
     json: Json = False,
 ) -> int:
-    """Stabilise a gait by feedback at its apexes, and run it with noise or after a push.
+    """Stabilise a gait by feedback at apexes; try noise and pushes.
 
     The feedback is linear, designed on the exact derivative of the stride. Touchdown angles cannot
-    change the energy of a passive animal; thrust such as legs.extension can. With --out the first
-    8 strides are kept in full and drawn, of a run that ended early the last 8; apexes.csv has all.
-    Units are SI and radians. Exit code 0: all strides done; 1: it fell, or nothing makes it
-    stable; 2: bad input; 3: the machine failed; 130: interrupted.
+    change the energy of a passive animal; thrust such as legs.extension can. With --out the first 8
+    strides are kept in full and drawn, of a run that ended early the last 8; apexes.csv has all.
+    Units are SI and radians.
+
+    Exit code 0: all strides done; 1: it fell, or nothing makes it stable; 2: bad input; 3: the
+    machine failed; 130: interrupted.
 
     Examples:
-        flexspine control --acting 0.01 --uniform --out results
+        flexspine control --acting 0.01 --uniform --out steered
 
-        flexspine control --steer touchdown.fore --steer touchdown.hind --once --sensing 0.002
+        flexspine control --steer touchdown.fore --steer touchdown.hind --once
 
-        flexspine control --gait results/gait-1.json --push 3 --strides 100 --json
+        flexspine control --push 3 --strides 100 --json
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.control.excerpt import excerpt
@@ -75,6 +91,8 @@ def control(
     interruptible()
     for option, value in (("--sensing", sensing), ("--acting", acting), ("--push", push)):
         check_number(option, value)
+    if uniform and not acting:
+        raise InputError("--uniform is given without --acting", "give --acting, what is uniform")
     noise = Noise(sensing=sensing, acting=acting, uniform=uniform)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())

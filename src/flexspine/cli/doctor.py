@@ -5,16 +5,19 @@ from __future__ import annotations
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
-from flexspine.cli.output import print_json
+from flexspine.cli.output import print_json, steps
 
 WORDS = {True: "ok", False: "WRONG", None: "-"}
 
 
 def doctor(json: Json = False) -> int:
-    """Look at versions, extras and the machine, and run a stride of which the numbers are known.
+    """Check that flexspine works here, and tell what is missing.
 
+    Looks at versions, extras and the machine, and runs a stride of which the numbers are known.
     Takes some seconds, the first time some more, as it compiles. A dash marks what is missing and
-    not needed. Exit code 0: it works; 3: something is wrong; 130: interrupted.
+    not needed.
+
+    Exit code 0: it works; 3: something is wrong; 130: interrupted.
 
     Examples:
         flexspine doctor
@@ -25,10 +28,12 @@ def doctor(json: Json = False) -> int:
 
     interruptible()
     found = []
-    for check in self_check():
-        found.append(check)
-        if not json:
-            print(f"{WORDS[check.passed]:<6}{check.name:<20}{check.told}", flush=True)
+    with steps() as progress:
+        progress.begin("looking")
+        for check in self_check():
+            found.append(check)
+            if not json:
+                print(f"{WORDS[check.passed]:<6}{check.name:<20}{check.told}", flush=True)
     works = all(check.passed is not False for check in found)
     if json:
         print_json(

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flexspine._version import SCHEMA_VERSION
+from flexspine.cli import completion
+from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
-from flexspine.cli.output import print_json
+from flexspine.cli.output import print_json, steps
 
 if TYPE_CHECKING:
     from flexspine.models.bounder import Body
@@ -36,12 +38,21 @@ class Phase(StrEnum):
 
 
 def equations(
-    model: Annotated[str, typer.Argument(help="A model such as flexible-bounder, or a preset.")],
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="A model such as flexible-bounder, or a preset.",
+            autocompletion=completion.models,
+        ),
+    ],
     phase: Annotated[Phase, typer.Option(help="The contact phase.")] = Phase.DS,
     format_: Annotated[Format, typer.Option("--format", help="How to set them.")] = Format.both,
     json: Json = False,
 ) -> None:
-    """Print a model's Lagrangian and the equations of motion derived from it.
+    """Print the Lagrangian and the equations of motion of a model.
+
+    Exit code 0: done; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine equations flexible-bounder
@@ -56,14 +67,17 @@ def equations(
     from flexspine.models.registry import KINDS
     from flexspine.parameters import quantities
 
+    interruptible()
     try:
         kind = KINDS[model] if model in KINDS else load_model(model).kind
     except UnknownNameError:
         raise UnknownNameError("model or preset", model, [*KINDS, *preset_names()]) from None
-    body = kind.body(DAMPED)
-    stance = stance_legs(body, phase.value, DAMPED)
-    lines = written_out(lagrangian(body, phase.value, stance))
-    letters = _letters(body, quantities(kind.parameters))
+    with steps() as progress:
+        progress.begin("deriving")
+        body = kind.body(DAMPED)
+        stance = stance_legs(body, phase.value, DAMPED)
+        lines = written_out(lagrangian(body, phase.value, stance))
+        letters = _letters(body, quantities(kind.parameters))
     if json:
         print_json(
             {

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import DEFAULT_ROBOT, Assignments, RobotName, numbers
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Assignments,
+    Json,
+    Locked,
+    Plane,
+    RobotName,
+    numbers,
+    output_file,
+)
+from flexspine.cli.output import print_json, steps
+from flexspine.cli.run3d import refuse_without_effect
 from flexspine.errors import InputError
 
-app = typer.Typer(help="What we know, in the files of others.", no_args_is_help=True)
+app = typer.Typer(help="Write the robot for other tools, as MJCF.", no_args_is_help=True)
 
 
 @app.callback()
@@ -24,32 +36,37 @@ def _group() -> None:
 def mjcf(
     robot: RobotName = DEFAULT_ROBOT,
     set_: Assignments = None,
-    plane: Annotated[
-        bool, typer.Option("--plane", help="Keep the robot to its plane: no abduction, no roll.")
-    ] = False,
+    plane: Plane = False,
     pinned: Annotated[
         str | None,
-        typer.Option(metavar="FOOT", help="The robot of 'verify pinned', held by this foot."),
+        typer.Option(
+            metavar="FOOT",
+            help="The robot of 'verify pinned', held by this foot.",
+            autocompletion=completion.feet,
+        ),
     ] = None,
-    locked: Annotated[bool, typer.Option("--locked", help="Lock the spine.")] = False,
+    locked: Locked = False,
     hold: Annotated[
         bool,
         typer.Option("--hold", help="Springs at the motors keep it standing; else it sinks down."),
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Write this file (default: to the terminal).")
+        Path | None, output_file("Write this file, not the terminal.", metavar="FILE.xml")
     ] = None,
+    json: Json = False,
 ) -> int:
-    """Write the robot as MJCF, which MuJoCo, its viewer and other tools load (extra engine).
+    """Write the robot as MJCF, for other tools (extra engine).
 
     Units are SI and radians; x forward, y left, z up (of --pinned: x forward, y up). Motors turn
-    hinges by the torque that they are told, and are limp before. Exit code 0: done; 2: bad input;
-    3: MuJoCo is missing or the machine failed.
+    hinges by the torque that they are told, and are limp before. 'python -m mujoco.viewer
+    --mjcf=FILE.xml' shows it.
+
+    Exit code 0: done; 2: bad input; 3: MuJoCo is missing or the machine failed; 130: interrupted.
 
     Examples:
-        flexspine export mjcf --hold --out sc618.xml && python -m mujoco.viewer --mjcf=sc618.xml
+        flexspine export mjcf --hold --out sc618.xml
 
-        flexspine export mjcf --pinned toe_1 --out pinned.xml
+        flexspine export mjcf --pinned toe_1 --out pinned.xml --json
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.control.spine_comparison import spine_of
@@ -66,20 +83,33 @@ def mjcf(
         raise InputError("--plane and --pinned are both given", "leave one of them")
     if hold and pinned:
         raise InputError("--hold and --pinned are both given", "leave one of them")
-    body = load_robot(robot, numbers("--set", set_))
+    changes = numbers("--set", set_)
+    body = load_robot(robot, changes)
+    refuse_without_effect(changes, plane=plane, locked=spine_of(body) if locked else None)
     body = lock(body, spine_of(body)) if locked else body
-    if pinned is not None:
-        spec = pinned_specification(mujoco, body.linkage, pinned)
-    else:
-        spec = specification(mujoco, SpaceRobot(body, plane), hold=hold)
-    spec.compile()
-    text = spec.to_xml()
-    if out is None:
-        print(text, end="")
-        return 0
-    with ExitStack() as stack:
-        directory = stack.enter_context(ResultDirectory(out.parent))
-        with directory.stage() as stage:
+    with steps() as progress:
+        progress.begin("describing")
+        if pinned is not None:
+            spec = pinned_specification(mujoco, body.linkage, pinned)
+        else:
+            spec = specification(mujoco, SpaceRobot(body, plane), hold=hold)
+        spec.compile()
+        text = spec.to_xml()
+    if out is not None:
+        with ResultDirectory(out.parent) as directory, directory.stage() as stage:
             (stage / out.name).write_text(text, encoding="utf-8")
-    print(f"robot in {out}")
+    if json:
+        told = {"mjcf": text} if out is None else {"file": str(out), "bytes": len(text.encode())}
+        print_json(
+            {
+                "schema_version": SCHEMA_VERSION,
+                "flexspine": __version__,
+                "robot": body.name,
+                **told,
+            }
+        )
+    elif out is None:
+        print(text, end="")
+    else:
+        print(f"robot in {out}")
     return 0

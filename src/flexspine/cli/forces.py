@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_ROBOT,
     Assignments,
     Json,
     RobotName,
-    assignments,
     numbers,
 )
-from flexspine.cli.output import print_json
+from flexspine.cli.output import print_json, steps
 from flexspine.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -28,36 +28,59 @@ if TYPE_CHECKING:
 def forces(
     robot: RobotName = DEFAULT_ROBOT,
     foot: Annotated[
-        list[str] | None, typer.Option(help="A foot that stands; repeat it (default: all).")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A foot that stands; repeat it.",
+            show_default="all",
+            autocompletion=completion.feet,
+        ),
     ] = None,
     aim: Annotated[
         str,
         typer.Option(
+            metavar="AIM",
             help="What to choose where there is a choice: split (normal forces as equal as can "
-            "be, or as --share says), torque (least torque) or friction (farthest from slipping)."
+            "be, or as --share says), torque (least torque) or friction (farthest from slipping).",
+            autocompletion=completion.among("split", "torque", "friction"),
         ),
     ] = "split",
     share: Annotated[
         list[str] | None,
-        typer.Option(metavar="FOOT=SHARE", help="A foot's share of the load, for --aim split."),
+        typer.Option(
+            metavar="FOOT=SHARE",
+            help="A foot's share of the load, for --aim split; repeat it for every foot.",
+            show_default="equal ones",
+        ),
     ] = None,
     lock: Annotated[
-        list[str] | None, typer.Option(help="A joint that is locked, e.g. spine; repeat it.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A joint that is locked, e.g. spine; repeat it.",
+            autocompletion=completion.joints,
+        ),
     ] = None,
     height: Annotated[float, typer.Option(help="Height of the hips, in m.")] = 0.33,
     ahead: Annotated[
         list[str] | None,
-        typer.Option(metavar="LEG=METRES", help="How far a leg's foot is ahead of its hip."),
+        typer.Option(
+            metavar="LEG=METRES",
+            help="How far a leg's foot is ahead of its hip, in m; repeat it.",
+            show_default="0",
+        ),
     ] = None,
     set_: Assignments = None,
     json: Json = False,
 ) -> int:
-    """Tell with which torques a robot can stand still, and choose the best.
+    """Tell with which torques a robot can stand still.
 
     It stands with a level trunk, all feet below their hips or ahead of them. Printed are how many
     torques there are (unique, a family and its dimension, or none), the torques and forces that are
     chosen, and within what the normal force on each foot can be shifted while none pulls or slips.
-    Units are SI. Exit code 0: it can stand; 1: it cannot; 2: bad input; 130: interrupted.
+    Units are SI and radians.
+
+    Exit code 0: it can stand; 1: it cannot; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine forces
@@ -73,7 +96,7 @@ def forces(
     from flexspine.models.robot_file import load_robot
 
     interruptible()
-    made = load_robot(robot, assignments("--set", set_))
+    made = load_robot(robot, numbers("--set", set_))
     feet = _feet(made, foot)
     for name in lock or []:
         if name not in made.joints:
@@ -86,10 +109,12 @@ def forces(
         if name not in legs:
             raise UnknownNameError("leg", name, legs)
     check_between("--height", height, 0, inf)
-    q = standing(made, height, places)
-    family = force_family(made.linkage, q, feet, locked=lock or [])
-    chosen = family.choose(Aim(aim), made.friction, _shares(feet, share, aim))
-    record = _record(made, feet, family, chosen)
+    with steps() as progress:
+        progress.begin("sharing the load")
+        q = standing(made, height, places)
+        family = force_family(made.linkage, q, feet, locked=lock or [])
+        chosen = family.choose(Aim(aim), made.friction, _shares(feet, share, aim))
+        record = _record(made, feet, family, chosen)
     if json:
         print_json(record)
     else:

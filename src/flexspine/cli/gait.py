@@ -12,16 +12,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_PRESET,
     Assignments,
     Json,
     Preset,
+    Seed,
     Symmetric,
     assignments,
     check_number,
     numbers,
+    output_directory,
     span,
 )
 from flexspine.cli.output import Steps, print_json, steps
@@ -41,15 +44,18 @@ DRAWN_PERIODS = 2
 def gait(
     preset: Preset = None,
     set_: Assignments = None,
-    energy: Annotated[float | None, typer.Option(help="Total energy (J).")] = None,
-    height: Annotated[float | None, typer.Option(help="Height of the CoM at the apex (m).")] = None,
-    speed: Annotated[float | None, typer.Option(help="Mean speed (m/s).")] = None,
+    energy: Annotated[float | None, typer.Option(help="Total energy, in J.")] = None,
+    height: Annotated[
+        float | None, typer.Option(help="Height of the CoM at the apex, in m.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Mean speed, in m/s.")] = None,
     fix: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
             help="Fix another quantity: an apex coordinate, e.g. pitch_rate=0.5 (speed is the "
-            "speed at the apex), touchdown.fore or touchdown.hind.",
+            "speed at the apex), touchdown.fore or touchdown.hind; repeat it.",
+            autocompletion=completion.ranges,
         ),
     ] = None,
     free: Annotated[
@@ -57,41 +63,45 @@ def gait(
         typer.Option(
             metavar="NAME=LOW:HIGH",
             help="Let a parameter be unknown, within bounds, e.g. spine.stiffness=200:300, or "
-            "legs.extension=0:0.02 to make good what dampers take.",
+            "legs.extension=0:0.02 to make good what dampers take; repeat it.",
+            autocompletion=completion.ranges,
         ),
     ] = None,
     within: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=LOW:HIGH",
-            help="Look for an unknown within bounds, e.g. touchdown.fore=0.4:0.5.",
+            help="Look for an unknown within bounds, e.g. touchdown.fore=0.4:0.5; repeat it.",
+            autocompletion=completion.ranges,
         ),
     ] = None,
     symmetric: Symmetric = None,
     starts: Annotated[
         int | None,
-        typer.Option(min=1, help="How many random starts, of each kind (default 100)."),
+        typer.Option(
+            min=1, metavar="N", help="How many random starts, of each kind.", show_default="100"
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts.")] = 0,
-    out: Annotated[
-        Path | None, typer.Option(help="Write the gaits and figures into this directory.")
-    ] = None,
+    seed: Seed = 0,
+    out: Annotated[Path | None, output_directory("gaits and figures")] = None,
     json: Json = False,
 ) -> int:
-    """Find all gaits with given energy, apex height and mean speed, and how stable they are.
+    """Find the gaits of an animal, and tell how stable they are.
 
-    What is not given is that of the preset's own gait, before any --set. With --fix nothing is
-    added: exactly what the options name is fixed. Units are SI and radians. Exit code 0: gaits
-    found; 1: none found; 2: bad input; 3: the machine failed; 130: interrupted.
+    They have the given energy, apex height and mean speed. What is not given is that of the
+    preset's own gait, before any --set. With --fix nothing is added: exactly what the options name
+    is fixed. Units are SI and radians.
+
+    Exit code 0: gaits found; 1: none found; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine gait --energy 290 --height 0.32 --speed 4.25
 
-        flexspine gait --set spine.stiffness=240 --symmetric --out results
+        flexspine gait --set spine.stiffness=240 --symmetric --out found
 
-        flexspine gait --energy 290 --fix height=0.32 --fix touchdown.fore=0.46 --json
+        flexspine gait --energy 290 --fix height=0.32 --fix touchdown.fore=0.46
 
-        flexspine gait --set spine.damping=1 --free legs.extension=0:0.02 --out results
+        flexspine gait --set spine.damping=1 --free legs.extension=0:0.02 --json
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.gaits.gait_record import gait_record
@@ -158,10 +168,16 @@ def _fixed(preset: str, named: dict[str, float | None], fix: list[str] | None) -
             raise ParameterError(
                 f"{OPTION.get(name, name)} = {value:g} is backward", "give 0 or more"
             )
+        if name in ABOVE_GROUND and value <= 0:
+            raise ParameterError(
+                f"{OPTION.get(name, name)} = {value:g} is below the ground", "give more than 0"
+            )
     return fixed
 
 
 OPTION = {"energy": "--energy", "height": "--height", "mean_speed": "--speed"}
+
+ABOVE_GROUND = ("energy", "height")
 
 FORWARD = ("mean_speed", "speed")
 

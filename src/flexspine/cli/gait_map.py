@@ -9,10 +9,19 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.basin import Out, how_made, keep_beside
-from flexspine.cli.options import DEFAULT_PRESET, Assignments, GaitFile, Json, Preset, span
+from flexspine.cli.options import (
+    DEFAULT_PRESET,
+    Assignments,
+    GaitFile,
+    Json,
+    Preset,
+    Processes,
+    Scheduler,
+    span,
+)
 from flexspine.cli.output import counting, print_json
 from flexspine.cli.starts import start_of
-from flexspine.cli.sweep import Processes, Scheduler, count_of, unfinished_is_kept
+from flexspine.cli.sweep import count_of, unfinished_is_kept
 from flexspine.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,27 +41,30 @@ def gait_map(
         str, typer.Option(metavar="LOW:HIGH", help="Mean speeds, in m/s.")
     ] = "2.4:4.7",
     lines: Annotated[
-        int | None, typer.Option(min=2, help="How many stiffnesses (default 29).")
+        int | None,
+        typer.Option(min=2, metavar="N", help="How many stiffnesses.", show_default="29"),
     ] = None,
     points: Annotated[
-        int | None, typer.Option(min=2, help="How many speeds for each (default 93).")
+        int | None,
+        typer.Option(min=2, metavar="N", help="How many speeds for each.", show_default="93"),
     ] = None,
     processes: Processes = None,
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> int:
-    """Follow a gait over mean speed for many spine stiffnesses, and map peak forces and stability.
+    """Map peak force and stability over speed and spine stiffness.
 
     Energy and apex height are those of the gait. It is carried to each stiffness and followed from
     there over all speeds; what that does not reach stays blank. Interrupted or killed, the same
-    command goes on; 'flexspine rerun DIR' repeats it. Exit code 0: done; 1: the start is no gait,
-    or there is none on the map; 2: bad input; 3: the machine or its workers failed;
-    130: interrupted.
+    command goes on; 'flexspine rerun DIR' repeats it.
+
+    Exit code 0: done; 1: the start is no gait, or there is none on the map; 2: bad input; 3: the
+    machine or its workers failed; 130: interrupted.
 
     Examples:
-        flexspine map --out results/map
+        flexspine map --out map
 
-        flexspine map --stiffness 200:280 --speeds 4:4.6 --lines 17 --points 25 --out DIR --json
+        flexspine map --stiffness 200:280 --lines 17 --points 25 --out small --json
     """
     from flexspine.report.map_figure import plot_map
     from flexspine.studies.gait_map import LINES, POINTS, map_plan, read_map
@@ -61,7 +73,7 @@ def gait_map(
     if gait is not None and preset is not None:
         raise InputError("--preset and --gait are both given", "leave one of them")
     ranges, count = (span("--stiffness", stiffness), span("--speeds", speeds)), count_of(processes)
-    start = start_of(preset or DEFAULT_PRESET, gait, set_)
+    start = start_of(DEFAULT_PRESET if preset is None else preset, gait, set_)
     plan = map_plan(
         start,
         *ranges,

@@ -14,7 +14,12 @@ def interruptible() -> None:
         signal.signal(number, _interrupt)
 
 
-def _interrupt(_number: int, _frame: FrameType | None) -> None:
+def uninterruptible() -> None:
+    """From here on it is too late: what is done, or being undone, is not to be left halfway."""
     for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # what is being undone is not to be left halfway
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    uninterruptible()
     raise KeyboardInterrupt

@@ -9,12 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.kept import kept
-from flexspine.cli.options import Assignments, GaitFile, Json, Preset
+from flexspine.cli.options import (
+    Assignments,
+    GaitFile,
+    Json,
+    Preset,
+    Processes,
+    output_directory,
+)
 from flexspine.cli.output import counting, print_json, steps
 from flexspine.cli.starts import starting_gait
-from flexspine.cli.sweep import Processes, count_of
+from flexspine.cli.sweep import count_of
 from flexspine.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -23,6 +31,11 @@ if TYPE_CHECKING:
 STIFFNESSES = (200.0, 220.0, 240.0, 260.0)
 SPEEDS = (3.0, 3.5, 4.0, 4.25, 4.5)
 
+# The limits there are.
+KNOWN = (
+    "acting_noise", "sensing_noise", "push_forward", "push_backward", "step_up", "step_down",
+)  # fmt: skip
+
 
 def limits(
     preset: Preset = None,
@@ -30,37 +43,40 @@ def limits(
     set_: Assignments = None,
     stiffness: Annotated[
         list[float] | None,
-        typer.Option(help="Spine stiffness in N m/rad; repeat it (default 200, 220, 240, 260)."),
+        typer.Option(
+            help="Spine stiffness, in N m/rad; repeat it.", show_default="200, 220, 240, 260"
+        ),
     ] = None,
     speed: Annotated[
         list[float] | None,
-        typer.Option(help="Mean speed in m/s; repeat it (default 3, 3.5, 4, 4.25, 4.5)."),
+        typer.Option(help="Mean speed, in m/s; repeat it.", show_default="3, 3.5, 4, 4.25, 4.5"),
     ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
             metavar="LIMIT",
-            help="acting_noise, sensing_noise, push_forward, push_backward, step_up, step_down; "
-            "repeat it (default: all).",
+            help=f"{', '.join(KNOWN)}; repeat it.",
+            show_default="all",
+            autocompletion=completion.among(*KNOWN),
         ),
     ] = None,
     processes: Processes = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Write a table and a figure into this directory.")
-    ] = None,
+    out: Annotated[Path | None, output_directory("a table and a figure")] = None,
     json: Json = False,
 ) -> int:
-    """Find what stabilised gaits survive at the most, over spine stiffness and mean speed.
+    """Find the largest noise, push and step that gaits survive.
 
     A gait is carried to every stiffness and speed at its energy and apex height, and stabilised by
     touchdown angles alone, once or at both flight apexes, and by thrust too. Survived are: noise,
-    1000 strides for six seeds; a push (N s), 50 strides; a step (m), 50 strides, at eight places
-    in the first: between these a lower one may trip. Sizes are found by doubling and bisection, to
-    a tenth of themselves. Interrupted, the same command goes on. Units are SI. Exit code 0: done;
-    1: no gait was found or stabilised; 2: bad input; 3: the machine failed; 130: interrupted.
+    1000 strides for six seeds; a push (N s), 50 strides; a step (m), 50 strides, at eight places in
+    the first: between these a lower one may trip. Sizes are found by doubling and bisection, to a
+    tenth of themselves. Interrupted, the same command goes on. Units are SI.
+
+    Exit code 0: done; 1: no gait was found or stabilised; 2: bad input; 3: the machine failed; 130:
+    interrupted.
 
     Examples:
-        flexspine limits --out results/limits
+        flexspine limits --out limits
 
         flexspine limits --stiffness 260 --speed 4.5 --only acting_noise --json
     """
@@ -72,6 +88,7 @@ def limits(
     for name in only or []:
         if name not in names:
             raise UnknownNameError("limit", name, names)
+    workers = count_of(processes)
     with ExitStack() as stack:
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         store = stack.enter_context(kept(out, "limits"))
@@ -83,7 +100,7 @@ def limits(
                 tuple(stiffness or STIFFNESSES),
                 tuple(speed or SPEEDS),
                 limits=[limit for limit in LIMITS if limit.name in (only or names)],
-                processes=count_of(processes),
+                processes=workers,
                 store=store,
                 progress=count,
             )

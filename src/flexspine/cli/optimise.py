@@ -12,11 +12,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import DEFAULT_PRESET, Assignments, GaitFile, Json, Preset, span
+from flexspine.cli.options import (
+    DEFAULT_PRESET,
+    Assignments,
+    GaitFile,
+    Json,
+    Preset,
+    Processes,
+    Seed,
+    check_number,
+    output_directory,
+    span,
+)
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.cli.starts import start_of
-from flexspine.cli.sweep import Processes, count_of
+from flexspine.cli.sweep import count_of
 from flexspine.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -37,11 +49,9 @@ class Spines(StrEnum):
 
 
 def optimise(
-    out: Annotated[
-        Path, typer.Option(help="Write gaits, tables and a figure into this directory.")
-    ],
+    out: Annotated[Path, output_directory("gaits, tables and a figure")],
     speed: Annotated[
-        float | None, typer.Option(help="Mean speed in m/s (default: that of the gait).")
+        float | None, typer.Option(help="Mean speed, in m/s.", show_default="that of the gait")
     ] = None,
     preset: Preset = None,
     gait: GaitFile = None,
@@ -50,21 +60,28 @@ def optimise(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Two of peak_grf, cost_of_transport (default) and spectral_radius; the second one "
-            "is kept below limits.",
+            help="Two of peak_grf, cost_of_transport and spectral_radius; the second one is kept "
+            "below limits.",
+            show_default="peak_grf, cost_of_transport",
+            autocompletion=completion.among("peak_grf", "cost_of_transport", RADIUS),
         ),
     ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=LOW:HIGH",
-            help="The range of a parameter, or of energy, height, ... (default: "
-            "spine.stiffness=100:1000, spine.damping=0.2:2, legs.extension=0:0.05).",
+            help="The range (SI) of a parameter, or of energy, height, ...; repeat it.",
+            show_default="spine.stiffness=100:1000, spine.damping=0.2:2, legs.extension=0:0.05",
+            autocompletion=completion.ranges,
         ),
     ] = None,
     keep: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Leave something as it is that varies by default."),
+        typer.Option(
+            metavar="NAME",
+            help="Leave something as it is that varies by default; repeat it.",
+            autocompletion=completion.among("spine.stiffness", "spine.damping", "legs.extension"),
+        ),
     ] = None,
     shift: Annotated[
         str,
@@ -75,29 +92,38 @@ def optimise(
     ] = "-0.5:0.5",
     spine: Annotated[Spines, typer.Option(help="Kinds of stiffness.")] = Spines.both,
     points: Annotated[
-        int | None, typer.Option(min=1, help="Limits of the second objective (default 12).")
+        int | None,
+        typer.Option(min=1, metavar="N", help="Limits of the second objective.", show_default="12"),
     ] = None,
     draws: Annotated[
         int | None,
-        typer.Option(min=0, help="Random designs whose gaits are started from (default 12)."),
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="How many random designs whose gaits are started from.",
+            show_default="12",
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random designs.")] = 0,
+    seed: Seed = 0,
     processes: Processes = None,
     json: Json = False,
 ) -> int:
-    """Find gaits of least peak force, cost of transport or spectral radius: a Pareto front.
+    """Find the best gaits: fronts of peak force, cost and stability.
 
-    Energy, apex height and mean speed are those of the gait, unless they vary. With stiffness by
-    phase the work of every switch counts. Every gait is simulated anew and certified. Interrupted,
-    the same command goes on. Units are SI and radians. Exit code 0: done; 1: no gait to start from;
-    2: bad input; 3: the machine or its workers failed; 130: interrupted.
+    Two of them are weighed against each other, a Pareto front. Energy, apex height and mean speed
+    are those of the gait, unless they vary. With stiffness by phase the work of every switch
+    counts. Every gait is simulated anew and certified. Interrupted, the same command goes on. Units
+    are SI and radians.
+
+    Exit code 0: done; 1: no gait to start from; 2: bad input; 3: the machine or its workers failed;
+    130: interrupted.
 
     Examples:
-        flexspine optimise --speed 4.25 --out results/optimise
+        flexspine optimise --speed 4.25 --out best
 
-        flexspine optimise --minimise peak_grf --minimise spectral_radius --out DIR
+        flexspine optimise --minimise peak_grf --minimise spectral_radius --out 2
 
-        flexspine optimise --vary height=0.3:0.34 --vary fore.leg.damping=20:50 --out DIR --json
+        flexspine optimise --vary height=0.3:0.34 --points 4 --out high --json
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.studies import optimise as study
@@ -106,10 +132,12 @@ def optimise(
     interruptible()
     if gait is not None and preset is not None:
         raise InputError("--preset and --gait are both given", "leave one of them")
+    if speed is not None:
+        check_number("--speed", speed)
     wanted = {Spines.constant: study.SPINES[:1], Spines.by_phase: study.SPINES[1:]}
     ranges, count = _ranges(dict(study.RANGES), vary, keep), count_of(processes)
     shifted = span("--shift", shift)
-    start = start_of(preset or DEFAULT_PRESET, gait, set_)
+    start = start_of(DEFAULT_PRESET if preset is None else preset, gait, set_)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         directory = stack.enter_context(ResultDirectory(out))

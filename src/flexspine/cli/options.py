@@ -1,4 +1,4 @@
-"""Options that several verbs share."""
+"""Options that several verbs share: their names, what they tell, and how they are read."""
 
 from __future__ import annotations
 
@@ -8,24 +8,66 @@ from typing import Annotated, Any
 
 import typer
 
-from flexspine.errors import InputError, ParameterError
+from flexspine.cli import completion
+from flexspine.errors import InputError, OutputError, ParameterError
 
-DEFAULT_PRESET = "kamimura2015-flexible"
-DEFAULT_ROBOT = "sc618"
+DEFAULT_PRESET, DEFAULT_ROBOT = completion.DEFAULT_PRESET, completion.DEFAULT_ROBOT
+
+
+def output_directory(what: str) -> Any:
+    """Declare ``--out``, a directory in which a verb writes ``what``."""
+    return typer.Option(
+        "--out", metavar="DIR", parser=_place, help=f"Write {what} into this directory."
+    )
+
+
+def output_file(about: str, metavar: str = "FILE") -> Any:
+    """Declare ``--out``, a file that a verb writes."""
+    return typer.Option("--out", metavar=metavar, parser=_place, help=about)
+
+
+def _place(text: str) -> Path:
+    """A place to write to; an empty one would be the working directory, which nobody asked for."""
+    if not text.strip():
+        raise OutputError("--out is given without a name", "give it a name, or leave it")
+    return Path(text)
+
 
 Preset = Annotated[
     str | None,
     typer.Option(
-        help=f"A preset (see 'flexspine presets') or a TOML file (default {DEFAULT_PRESET})."
+        metavar="NAME",
+        help="A preset (see 'flexspine presets') or a TOML file.",
+        show_default=DEFAULT_PRESET,
+        autocompletion=completion.presets,
     ),
 ]
 RobotName = Annotated[
     str,
-    typer.Option("--robot", help=f"A robot ({DEFAULT_ROBOT}) or a TOML file that describes one."),
+    typer.Option(
+        "--robot",
+        metavar="NAME",
+        help="A robot (see 'flexspine presets') or a TOML file that describes one.",
+        autocompletion=completion.robots,
+    ),
 ]
 GaitFile = Annotated[
     Path | None,
     typer.Option("--gait", metavar="FILE", help="A gait saved by 'flexspine gait --out'."),
+]
+Walks = Annotated[
+    str,
+    typer.Option(
+        "--gait",
+        metavar="NAME",
+        help="trot or bound of the robot, one of another robot (sc618-trot), or a TOML file, such "
+        "as 'tune' writes.",
+        autocompletion=completion.walks,
+    ),
+]
+Locked = Annotated[bool, typer.Option("--locked", help="Lock the spine: one stiff trunk.")]
+Plane = Annotated[
+    bool, typer.Option("--plane", help="Keep the robot to its plane: no abduction, no roll.")
 ]
 Symmetric = Annotated[
     bool | None,
@@ -34,30 +76,62 @@ Symmetric = Annotated[
         help="Only gaits that are their own mirror image in time, or gaits of any shape.",
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")
+]
 Tolerance = Annotated[
-    float | None, typer.Option(help="Tolerance of the integrator (default 1e-12).")
+    float | None, typer.Option(help="Tolerance of the integrator.", show_default="1e-12")
 ]
-RunDirectory = Annotated[
-    Path | None, typer.Option(help="Write data, figures and animations into this directory.")
+Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of all that is drawn at random.")]
+Processes = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Processes on this machine; results do not depend on them.",
+        show_default="one a core",
+    ),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="tcp://HOST:PORT", help="Use the workers of this Dask scheduler instead."),
+]
+RunDirectory = Annotated[Path | None, output_directory("data, figures and animations")]
 Animation = Annotated[
     bool, typer.Option("--animation/--no-animation", help="Make animations with --out.")
 ]
-Assignments = Annotated[
+
+
+def _settable(examples: str) -> Any:
+    return typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help=f"Set a parameter by its dotted name, e.g. {examples}; repeat it.",
+        autocompletion=completion.settings,
+    )
+
+
+Assignments = Annotated[list[str] | None, _settable("spine.stiffness=240")]
+RobotAssignments = Annotated[list[str] | None, _settable("spine.stiffness=300, gait.speed=0.4")]
+WalkAssignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter, e.g. spine.stiffness=240."),
+    _settable("spine.stiffness=300, gait.speed=0.4, servo.damping=1.5, space.foot_radius=0.03"),
 ]
 Apex = Annotated[
     list[str] | None,
-    typer.Option("--apex", metavar="NAME=VALUE", help="Set a start value, e.g. height=0.32."),
+    typer.Option(
+        "--apex",
+        metavar="NAME=VALUE",
+        help="Set a start value, e.g. height=0.32; repeat it.",
+        autocompletion=completion.apex,
+    ),
 ]
 Touchdown = Annotated[
     list[str] | None,
     typer.Option(
         "--touchdown",
         metavar="LEG=ANGLE",
-        help="Set a touchdown angle in radians from the vertical, e.g. fore=0.46.",
+        help="Set a touchdown angle in rad from the vertical, e.g. fore=0.46; repeat it.",
+        autocompletion=completion.among("fore=", "hind="),
     ),
 ]
 

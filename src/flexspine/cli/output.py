@@ -6,28 +6,21 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
-
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TaskID,
-    TextColumn,
-    TimeRemainingColumn,
-)
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from flexspine._version import SCHEMA_VERSION
+from flexspine.cli.interrupts import uninterruptible
 from flexspine.errors import FlexspineError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn, TaskID
 
 
 def print_json(record: dict[str, Any]) -> None:
-    """Print one JSON object; a NaN in it is a mistake of ours and raises."""
-    print(json.dumps(record, allow_nan=False))
+    """Print one JSON object, whole; a NaN in it is a mistake of ours and raises."""
+    text = json.dumps(record, allow_nan=False)
+    uninterruptible()  # or a second object would tell so
+    print(text)
 
 
 def fail(failure: FlexspineError, as_json: bool) -> int:
@@ -64,28 +57,26 @@ class Steps:
 @contextmanager
 def steps() -> Iterator[Steps]:
     """Show progress on stderr while the block runs; nothing when stderr is not a terminal."""
-    console = Console(stderr=True)
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    with _shown(*columns) as bar:
         yield Steps(bar, bar.add_task("", total=1.0))
 
 
 @contextmanager
 def counting(what: str) -> Iterator[Callable[[int, int], None]]:
     """Show how many of how many are done on stderr, with rate and time left."""
-    console = Console(stderr=True)
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        Rate(),
+        _rate(),
         TimeRemainingColumn(),
     )
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    with _shown(*columns) as bar:
         task = bar.add_task(what, total=None)
 
         def show(done: int, whole: int) -> None:
@@ -94,9 +85,29 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
         yield show
 
 
-class Rate(ProgressColumn):
-    """How many are done a second."""
+@contextmanager
+def _shown(*columns: ProgressColumn) -> Iterator[Progress]:
+    """Show progress where a person watches, whatever the environment says of colours."""
+    from rich.console import Console
+    from rich.progress import Progress
 
-    def render(self, task: Task) -> Text:
-        """Show it, once something was done."""
-        return Text(f"{task.speed:,.0f}/s" if task.speed else "")
+    with Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=sys.stdout.isatty(),  # what is piped is never to end up on stderr
+        disable=not sys.stderr.isatty(),
+    ) as bar:
+        yield bar
+
+
+def _rate() -> ProgressColumn:
+    """How many are done a second, once something was done."""
+    from rich.progress import ProgressColumn, Task
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(f"{task.speed:,.0f}/s" if task.speed else "")
+
+    return Rate()

@@ -22,19 +22,21 @@ def report(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.html", help=f"Write this file (default DIR/{PAGE})."),
+        typer.Option(metavar="FILE.html", help="Write this file.", show_default=f"DIR/{PAGE}"),
     ] = None,
     json: Json = False,
 ) -> int:
-    """Write results as one HTML page: summary, parameters, plots, player, tables, verdicts.
+    """Write a directory of results as one HTML page.
 
-    The page opens offline in any browser and loads nothing. Exit code 0: done; 2: bad input;
-    3: the machine failed; 130: interrupted.
+    It has a summary, parameters, plots, a player, tables and verdicts. The page opens offline in
+    any browser and loads nothing.
+
+    Exit code 0: done; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
-        flexspine report results
+        flexspine bound --out run && flexspine report run
 
-        flexspine report results/trot --out trot.html
+        flexspine report run --out run.html
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.report.document import document

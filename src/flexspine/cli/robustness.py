@@ -10,73 +10,86 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.kept import kept
-from flexspine.cli.options import Json
+from flexspine.cli.options import Json, Processes, Seed, output_directory
 from flexspine.cli.output import counting, print_json, steps
 from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
-from flexspine.cli.sweep import Processes, count_of
+from flexspine.cli.sweep import count_of
 from flexspine.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from flexspine.control.stabilize import Stabilizer
     from flexspine.studies.robustness import Endurance, Robustness
+# m/s
+SPEED = 4.5
+
+# What can be completed.
+DISTURBANCES = ("push", "step", "rough", "blocks", "acting", "sensing")
+BODIES = ("published-rigid", "locked-spine", "flexible")
 
 
 def robustness(
     kind: Annotated[
         str,
         typer.Argument(
-            metavar="KIND", help="push, step, rough, blocks, acting or sensing (noise)."
+            metavar="KIND",
+            help="push, step, rough, blocks, acting or sensing (noise).",
+            autocompletion=completion.among(*DISTURBANCES),
         ),
     ],
-    out: Annotated[
-        Path | None, typer.Option(help="Write runs, figure and summary into this directory.")
-    ] = None,
+    out: Annotated[Path | None, output_directory("runs, a figure and a summary")] = None,
     body: Annotated[
         list[str] | None,
         typer.Option(
-            help="published-rigid, locked-spine or flexible; repeat it (default: all three)."
+            metavar="NAME",
+            help="published-rigid, locked-spine or flexible; repeat it.",
+            show_default="all three",
+            autocompletion=completion.among(*BODIES),
         ),
     ] = None,
     gait: Annotated[
         list[Path] | None,
-        typer.Option(
-            metavar="FILE", help="A gait saved by 'flexspine gait --out' instead; repeat it."
-        ),
+        typer.Option(metavar="FILE", help="A gait saved by 'flexspine gait --out'; repeat it."),
     ] = None,
-    speed: Annotated[float, typer.Option(help="Mean speed of the bodies' gaits, in m/s.")] = 4.5,
-    runs: Annotated[int, typer.Option(min=1, help="How many runs of each.")] = 10_000,
+    speed: Annotated[
+        float | None,
+        typer.Option(help="Mean speed of the bodies' gaits, in m/s.", show_default="4.5"),
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, metavar="N", help="How many runs of each.")] = 10_000,
     strides: Annotated[
-        int, typer.Option(min=1, help="How many strides a run has to make to survive.")
+        int, typer.Option(min=1, metavar="N", help="How many strides a run has to make.")
     ] = 50,
     largest: Annotated[
         float | None,
         typer.Option(
-            help="The largest disturbance, drawn evenly up to it (default: push 20 N s, step "
-            "0.06 m, rough 0.03 m, blocks 0.02 m, noise 0.03)."
+            help="The largest disturbance (SI), drawn evenly up to it.",
+            show_default="push 20 N s, step 0.06 m, rough 0.03 m, blocks 0.02 m, noise 0.03",
         ),
     ] = None,
     steer: Steer = None,
     method: Method = "lqr",
     once: Once = False,
     effort: Effort = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the disturbances.")] = 0,
+    seed: Seed = 0,
     processes: Processes = None,
     json: Json = False,
 ) -> int:
-    """Disturb stabilised gaits thousands of times at random, and tell what they survive.
+    """Disturb stabilised gaits at random, and tell what they survive.
 
     Gaits have the energy and apex height of the published ones; feedback is designed for each by
-    the same rule, and each meets the same disturbances: a push forward or backward at an apex
-    (N s), a step up or down anywhere in a stride, rough ground, or noise. Interrupted, the same
-    command goes on. Units are SI. Exit code 0: done; 1: no feedback makes a gait stable; 2: bad
-    input, or a speed without a gait; 3: the machine failed; 130: interrupted.
+    the same rule, and each meets the same disturbances: a push forward or backward at an apex (N
+    s), a step up or down anywhere in a stride, rough ground, or noise. Interrupted, the same
+    command goes on. Units are SI.
+
+    Exit code 0: done; 1: no feedback makes a gait stable; 2: bad input, or a speed without a gait;
+    3: the machine failed; 130: interrupted.
 
     Examples:
-        flexspine robustness step --out results/step
+        flexspine robustness step --out step
 
-        flexspine robustness push --runs 1000 --body flexible --body locked-spine --json
+        flexspine robustness push --runs 1000 --body flexible --json
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.control.disturbance import disturbance
@@ -85,9 +98,14 @@ def robustness(
 
     if body and gait:
         raise InputError("--body and --gait are both given", "leave one of them")
+    if speed is not None and gait:
+        raise InputError("--speed and --gait are both given", "leave one of them")
     interruptible()
     disturbance(kind)  # refused before anything is done
-    check_between("--speed", speed, 0, inf)
+    for option, value in (("--speed", speed), ("--largest", largest)):
+        if value is not None:
+            check_between(option, value, 0, inf)
+    workers = count_of(processes)
     with ExitStack() as stack:
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         store = stack.enter_context(kept(out, kind))
@@ -95,12 +113,12 @@ def robustness(
             progress.begin("looking for gaits")
             animals = {
                 name: stabilizer_of(found, steer, method, once, effort)
-                for name, found in _gaits(body, gait, speed).items()
+                for name, found in _gaits(body, gait, SPEED if speed is None else speed).items()
             }
         with counting("runs") as count:
             found = survive(
                 animals, kind, largest=largest, runs=runs, strides=strides, seed=seed,
-                processes=count_of(processes), store=store, progress=count,
+                processes=workers, store=store, progress=count,
             )  # fmt: skip
         record = _record(found, animals)
         if directory is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,8 +15,13 @@ from flexspine.cli.options import (
     DEFAULT_ROBOT,
     Animation,
     Json,
+    Locked,
+    Plane,
     RobotName,
     RunDirectory,
+    Seed,
+    WalkAssignments,
+    Walks,
     numbers,
 )
 from flexspine.cli.output import Steps, print_json, steps
@@ -31,40 +37,18 @@ PICTURES = re.compile(r"(figure|animation|film)\.(png|mp4|gif)")
 
 FILMS, FILM_RATE = ("film.mp4", "film.gif"), 25
 
-Walks = Annotated[
-    str,
-    typer.Option(
-        "--gait",
-        help="trot or bound of the robot, one of another robot (sc618-trot), or a TOML file, such "
-        "as 'tune' writes.",
-    ),
-]
-WalkAssignments = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Set a number of the robot, the gait or its servos, e.g. spine.stiffness=300, "
-        "gait.speed=0.4, servo.damping=1.5, space.ground_stiffness=1e5.",
-    ),
-]
-
 
 def run3d(
     robot: RobotName = DEFAULT_ROBOT,
     gait: Walks = "trot",
     set_: WalkAssignments = None,
     seconds: Annotated[float, typer.Option(help="How long to walk, in s.")] = 15.0,
-    locked: Annotated[
-        bool, typer.Option("--locked", help="Lock the spine: one stiff trunk.")
-    ] = False,
-    plane: Annotated[
-        bool, typer.Option("--plane", help="Keep the robot to the plane of its description.")
-    ] = False,
+    locked: Locked = False,
+    plane: Plane = False,
     sensing: Annotated[
         float, typer.Option(help="Read angles of joints off by up to this much, in rad.")
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
+    seed: Seed = 0,
     render: Annotated[
         bool, typer.Option("--render", help="With --out, film it as MuJoCo draws it (OpenGL).")
     ] = False,
@@ -72,15 +56,17 @@ def run3d(
     animation: Animation = True,
     json: Json = False,
 ) -> int:
-    """Let the robot walk in space, drawn by coupled oscillators, in MuJoCo (extra engine).
+    """Let the robot walk in space, in MuJoCo (extra engine).
 
-    It starts standing. Units are SI and radians. Exit code 0: it stayed up; 1: it did not; 2: bad
-    input; 3: MuJoCo or OpenGL is missing, or the machine failed; 130: interrupted.
+    It starts standing, and coupled oscillators draw its legs. Units are SI and radians.
+
+    Exit code 0: it stayed up; 1: it did not; 2: bad input; 3: MuJoCo or OpenGL is missing, or the
+    machine failed; 130: interrupted.
 
     Examples:
-        flexspine run3d --gait trot --seconds 15 --out results/trot3d
+        flexspine run3d --out trot3d
 
-        flexspine run3d --gait bound --seconds 10 --render --out results/bound3d
+        flexspine run3d --gait bound --seconds 10 --render --out bound3d
 
         flexspine run3d --locked --set gait.speed=0.4 --json
     """
@@ -94,7 +80,7 @@ def run3d(
     mujoco_module()
     if render and out is None:
         raise InputError("--render is given without --out", "give --out, where the film goes")
-    walker = walker_of(robot, gait, set_, lock=locked)
+    walker = walker_of(robot, gait, set_, lock=locked, plane=plane)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
@@ -120,7 +106,9 @@ def run3d(
     return 0 if run.outcome.completed else 1
 
 
-def walker_of(robot: str, gait: str, given: list[str] | None, *, lock: bool = False) -> Walker:
+def walker_of(
+    robot: str, gait: str, given: list[str] | None, *, lock: bool = False, plane: bool = False
+) -> Walker:
     """What walks, and how, as options tell it. Raises `InputError`."""
     from flexspine.control.gains import load_walk
     from flexspine.control.spine_comparison import spine_of
@@ -134,13 +122,21 @@ def walker_of(robot: str, gait: str, given: list[str] | None, *, lock: bool = Fa
     walk = load_walk(gait, body.name)
     walker = Walker(f"{body.name}-{walk.name}", body, walk).with_values(changes)
     walker.check()
-    if not lock:
-        return walker
-    spine = spine_of(body)
+    refuse_without_effect(changes, plane=plane, locked=spine_of(body) if lock else None)
+    return walker.with_locked_spine() if lock else walker
+
+
+# What tells only of motions that leave the plane.
+ACROSS = ("space.yaw_stiffness", "space.yaw_damping", "servo.out_stiffness", "servo.out_damping")
+
+
+def refuse_without_effect(changes: Iterable[str], *, plane: bool, locked: str | None) -> None:
+    """Raise `InputError` if what is set is of joints that --plane or --locked leaves out."""
     for name in changes:
-        if name.startswith(f"{spine}."):
+        if plane and name in ACROSS:
+            raise InputError(f"--set {name} and --plane are both given", "leave one of them")
+        if locked is not None and name.startswith(f"{locked}."):
             raise InputError(f"--set {name} and --locked are both given", "leave one of them")
-    return walker.with_locked_spine()
 
 
 def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:

@@ -8,10 +8,19 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.basin import Out, how_made, keep_beside
-from flexspine.cli.options import DEFAULT_ROBOT, Json, RobotName
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Json,
+    Processes,
+    RobotName,
+    Scheduler,
+    Seed,
+    WalkAssignments,
+    Walks,
+)
 from flexspine.cli.output import counting, print_json
-from flexspine.cli.run3d import WalkAssignments, Walks, walker_of
-from flexspine.cli.sweep import Processes, Scheduler, count_of, unfinished_is_kept
+from flexspine.cli.run3d import walker_of
+from flexspine.cli.sweep import count_of, unfinished_is_kept
 
 if TYPE_CHECKING:
     from flexspine.studies.sweep import Sweep
@@ -26,33 +35,36 @@ def spines(
     stiffness: Annotated[
         list[float] | None,
         typer.Option(
-            help="Spine stiffness in N m/rad; repeat it (default 30, 60, 120, 240, 480, 960)."
+            help="Spine stiffness, in N m/rad; repeat it.",
+            show_default="30, 60, 120, 240, 480, 960",
         ),
     ] = None,
     speed: Annotated[
         list[float] | None,
         typer.Option(
-            help="Speed of feet under the hips in m/s; repeat it (default 0.6 to 1.6 times the "
-            "gait's own)."
+            help="Speed of feet under the hips, in m/s; repeat it.",
+            show_default="0.6 to 1.6 times the gait's own",
         ),
     ] = None,
     seconds: Annotated[float, typer.Option(help="How long each walks, in s.")] = 10.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of the noise on the sensors.")] = 0,
+    seed: Seed = 0,
     processes: Processes = None,
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> int:
-    """Let the robot walk in space with many spines at many speeds, a locked spine beside them.
+    """Compare flexible spines with a locked one, walking in space.
 
-    Compared are normal forces, impacts, oscillation of the CoM, cost of transport, the speed
-    reached, and who falls. It is a sweep: interrupted or killed, the same command goes on;
-    'flexspine rerun DIR' repeats it. Units are SI. Exit code 0: done; 1: all fell; 2: bad input;
-    3: MuJoCo is missing, or the machine or its workers failed; 130: interrupted.
+    The robot walks with each at many speeds. Compared are normal forces, impacts, oscillation of
+    the CoM, cost of transport, the speed reached, and who falls. It is a sweep: interrupted or
+    killed, the same command goes on; 'flexspine rerun DIR' repeats it. Units are SI and radians.
+
+    Exit code 0: done; 1: all fell; 2: bad input; 3: MuJoCo is missing, or the machine or its
+    workers failed; 130: interrupted.
 
     Examples:
-        flexspine spines --gait trot --out results/spines
+        flexspine spines --out spines
 
-        flexspine spines --gait bound --stiffness 60 --stiffness 240 --speed 0.7 --out DIR --json
+        flexspine spines --gait bound --stiffness 60 --speed 0.7 --out few --json
     """
     from flexspine.engines.installed import mujoco_module
     from flexspine.report.walks_figure import plot_walks

@@ -34,7 +34,10 @@ def start_of(preset: str, file: Path | None, set_: list[str] | None) -> Gait:
 
     if file is not None:
         refuse_besides_gait({"--set": set_})
-    found = examine(load_model(preset)) if file is None else load_gait(file)
+    interruptible()
+    with steps() as progress:
+        progress.begin("looking at the gait to start from")
+        found = examine(load_model(preset)) if file is None else load_gait(file)
     if found.flaw is not None:
         # No InputError: its exit code is that of what ended without its goal.
         raise FlexspineError(
@@ -43,7 +46,6 @@ def start_of(preset: str, file: Path | None, set_: list[str] | None) -> Gait:
         )
     if not set_:
         return found
-    interruptible()
     with steps() as progress:
         return starting_gait(None, preset, set_, None, progress)
 
@@ -68,6 +70,7 @@ def starting_gait(
                 f"'{file}' holds no gait: {saved.flaw}", "find one with 'flexspine gait --out'"
             )
         return saved
+    progress.begin("looking at the gait to start from")
     name = DEFAULT_PRESET if preset is None else preset
     model = load_model(name, assignments("--set", set_))
     own = own_gait(name, "find one with 'flexspine gait --out' and give it with --gait")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flexspine.cli import completion
+
 if TYPE_CHECKING:
     from flexspine.control.stabilize import Stabilizer
     from flexspine.gaits.gait import Gait
@@ -17,19 +19,26 @@ Steer = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME",
-        help=f"What is steered; repeat it (default {', '.join(USUAL_INPUTS)}).",
+        help="What is steered: a touchdown angle or a parameter; repeat it.",
+        show_default=", ".join(USUAL_INPUTS),
+        autocompletion=completion.quantities,
     ),
 ]
 Method = Annotated[
-    str, typer.Option(help="lqr, or deadbeat, which acts once a stride.", metavar="METHOD")
+    str,
+    typer.Option(
+        metavar="METHOD",
+        help="lqr, or deadbeat, which acts once a stride.",
+        autocompletion=completion.among("lqr", "deadbeat"),
+    ),
 ]
 Once = Annotated[
-    bool, typer.Option("--once", help="Act at the apex after both stances only (default: at both).")
+    bool, typer.Option("--once", help="Act at the apex after both stances only, not at both.")
 ]
 Effort = Annotated[
     float | None,
     typer.Option(
-        help="What steering costs beside deviations, both in natural units (default 0.1)."
+        help="What steering costs beside deviations, both in natural units.", show_default="0.1"
     ),
 ]
 

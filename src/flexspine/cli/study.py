@@ -16,7 +16,7 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import Json, span
+from flexspine.cli.options import Json, check_number, output_directory, span
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.errors import ParameterError
 
@@ -39,37 +39,39 @@ def study(
     height: Annotated[float, typer.Option(help="Apex height of every gait, in m.")] = 0.32,
     stiffness: Annotated[
         list[float] | None,
-        typer.Option(help="Spine stiffness in N m/rad; repeat it (default 200, 220, 240, 260)."),
+        typer.Option(
+            help="Spine stiffness, in N m/rad; repeat it.", show_default="200, 220, 240, 260"
+        ),
     ] = None,
     speeds: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Range of mean speeds, in m/s.")
+        str, typer.Option(metavar="LOW:HIGH", help="Mean speeds, in m/s.")
     ] = "2.4:4.7",
     compare: Annotated[
         list[float] | None,
         typer.Option(
-            help="Mean speed in m/s of profiles and of sweeps over stiffness; repeat it "
-            "(default 4.0, 4.25, 4.5)."
+            help="Mean speed, in m/s, of profiles and of sweeps over stiffness; repeat it.",
+            show_default="4.0, 4.25, 4.5",
         ),
     ] = None,
     damping: Annotated[
         list[float] | None,
         typer.Option(
-            help="Spine damping in N m s/rad of sweeps over stiffness that tell what compliance "
-            "costs; repeat it (default 0.1, 1)."
+            help="Spine damping, in N m s/rad, of sweeps over stiffness that tell what compliance "
+            "costs; repeat it.",
+            show_default="0.1, 1",
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Write tables, figures and verdicts into this directory.")
-    ] = None,
+    out: Annotated[Path | None, output_directory("tables, figures and verdicts")] = None,
     json: Json = False,
 ) -> int:
-    """Compare bounding with a rigid, a locked and a flexible spine, and judge the published claims.
+    """Compare rigid, locked and flexible spines: the published study.
 
-    Follows the gaits of each body over mean speed, and over spine stiffness at fixed speeds; damped
-    ones, kept going by an actuator, over damping and over stiffness. With --out, a study that was
-    interrupted goes on where it was when the same command is given again.
-    Units are SI and radians. Exit code 0: done; 2: bad input; 3: the machine failed;
-    130: interrupted.
+    Judges its claims. Follows the gaits of each body over mean speed, and over spine stiffness at
+    fixed speeds; damped ones, kept going by an actuator, over damping and over stiffness. With
+    --out, a study that was interrupted goes on where it was when the same command is given again.
+    Units are SI and radians.
+
+    Exit code 0: done; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
         flexspine study --out results
@@ -84,6 +86,13 @@ def study(
     from flexspine.studies.spines import Setting, study_spines
 
     interruptible()
+    for option, value in (("--energy", energy), ("--height", height)):
+        check_number(option, value)
+    for option, several in (
+        ("--stiffness", stiffness), ("--compare", compare), ("--damping", damping),
+    ):  # fmt: skip
+        for value in several or ():
+            check_number(option, value)
     usual = Setting()
     setting = Setting(
         energy=energy,

@@ -12,42 +12,33 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import Json
+from flexspine.cli.options import Json, Processes, Scheduler, output_directory
 from flexspine.cli.output import counting, print_json
 
 if TYPE_CHECKING:
     from flexspine.studies.sweep import Sweep
 
-Processes = Annotated[
-    int | None,
-    typer.Option(
-        help="Processes on this machine (default: one a core). Results do not depend on them."
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="tcp://HOST:PORT", help="Use the workers of this Dask scheduler instead."),
-]
-
 
 def sweep(
     plan: Annotated[Path, typer.Argument(metavar="FILE.toml", help="What to do.")],
-    out: Annotated[Path, typer.Option(help="Keep the rows in this directory.")],
+    out: Annotated[Path, output_directory("the rows")],
     processes: Processes = None,
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> int:
-    """Simulate, find gaits or let robots walk at points of a grid or sample, and keep the rows.
+    r"""Run simulations, searches or walks over a grid or a sample.
 
     The file names models and axes, a task (runs, searches, gaits, walks) and its options. Rows land
     in Parquet files in DIR/rows, a chunk at a time. Interrupted or killed, the same command goes
-    on. Exit code 0: done; 1: searches or gaits of which none was found; 2: bad input; 3: the
-    machine or its workers failed; 130: interrupted.
+    on.
+
+    Exit code 0: done; 1: searches or gaits of which none was found; 2: bad input; 3: the machine or
+    its workers failed; 130: interrupted.
 
     Examples:
-        flexspine sweep examples/million_strides.toml --out results/million
+        printf 'model = "scout2"\naxes.height = [0.34, 0.35]\n' > plan.toml
 
-        flexspine sweep FILE.toml --out DIR --scheduler tcp://node1:8786
+        flexspine sweep plan.toml --out rows
     """
     from flexspine.studies.sweep import sweep as carry_out
     from flexspine.studies.task_kinds import RUNS, WALKS
@@ -69,18 +60,27 @@ def sweep(
 
 
 def rerun(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What 'flexspine sweep' made.")],
+    directory: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="What 'sweep', 'basin', 'map' or 'spines' wrote with --out."
+        ),
+    ],
     processes: Processes = None,
     scheduler: Scheduler = None,
     json: Json = False,
 ) -> int:
-    """Repeat a sweep from its manifest, and say whether it came out the same, bit for bit.
+    """Repeat a sweep and say whether it is the same, bit for bit.
 
-    Nothing is written. Exit code 0: the same; 1: not the same; 2: bad input; 3: the machine or its
-    workers failed; 130: interrupted.
+    It is done again from its manifest; nothing is written.
+
+    Exit code 0: the same; 1: not the same; 2: bad input; 3: the machine or its workers failed; 130:
+    interrupted.
 
     Examples:
-        flexspine rerun results/million
+        flexspine basin --points 20 --strides 5 --out basin
+
+        flexspine rerun basin
     """
     from flexspine.studies.sweep import rerun as repeat
 

@@ -6,9 +6,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
+from flexspine.cli import completion
 from flexspine.cli.control import report
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.kept import kept
@@ -18,19 +18,25 @@ from flexspine.cli.options import (
     GaitFile,
     Json,
     Preset,
+    Processes,
     RunDirectory,
+    Seed,
     numbers,
 )
-from flexspine.cli.output import counting, print_json, steps
+from flexspine.cli.output import print_json, steps
 from flexspine.cli.starts import starting_gait
 from flexspine.cli.steering_options import Effort, Method, Once, Steer, stabilizer_of
-from flexspine.cli.sweep import Processes, count_of
+from flexspine.cli.sweep import count_of
 from flexspine.errors import InputError
 
 if TYPE_CHECKING:
     from flexspine.control.steering import SteeredRun, Steering
     from flexspine.gaits.gait import Gait
     from flexspine.studies.wayfaring import Wayfaring
+
+# What can be completed; a file goes too.
+GROUNDS = ("step", "stairs", "ramp", "slope", "waves", "rough", "blocks")
+NUMBERS = ("height", "length", "count", "degrees", "amplitude", "wavelength", "spacing")
 
 
 def terrain(
@@ -40,6 +46,7 @@ def terrain(
             metavar="KIND",
             help="step, stairs, ramp, slope, waves, rough, blocks, or a CSV file with columns x, y "
             "in m.",
+            autocompletion=completion.among(*GROUNDS),
         ),
     ] = "rough",
     with_: Annotated[
@@ -47,8 +54,9 @@ def terrain(
         typer.Option(
             "--with",
             metavar="NAME=VALUE",
-            help="A number of the ground: height, length, count, degrees, amplitude, wavelength, "
-            "spacing (m; degrees of a slope).",
+            help="A number of the ground: height, length, amplitude, wavelength, spacing (in m), "
+            "count, degrees; repeat it.",
+            autocompletion=completion.among(*(f"{name}=" for name in NUMBERS)),
         ),
     ] = None,
     preset: Preset = None,
@@ -61,34 +69,35 @@ def terrain(
     method: Method = "lqr",
     once: Once = False,
     effort: Effort = None,
-    strides: Annotated[int, typer.Option(min=1, help="How many strides to run at most.")] = 50,
+    strides: Annotated[int, typer.Option(min=1, metavar="N", help="How many strides to run.")] = 50,
     runs: Annotated[
-        int, typer.Option(min=1, help="How many runs, each over ground of another seed.")
+        int,
+        typer.Option(min=1, metavar="N", help="How many runs, each over ground of another seed."),
     ] = 1,
-    seed: Annotated[
-        int, typer.Option(min=0, help="Draws the heights, and where in a stride the ground begins.")
-    ] = 0,
+    seed: Seed = 0,
     processes: Processes = None,
     out: RunDirectory = None,
     animation: Animation = True,
     json: Json = False,
 ) -> int:
-    """Run a stabilised gait over ground that is not flat, and tell how far it comes.
+    """Run over steps, slopes, waves or rough ground.
 
-    The feedback is that of 'flexspine control'; heights are measured from the ground below the
-    CoM. Legs keep their length in the air, so that whether a toe clears a face depends on where in
-    the stride it stands. With --out the first 8 strides are kept in full and drawn, of a run that
-    ended early the last 8; apexes.csv has all. With --runs, distances to the first fall are told;
-    interrupted, the same command goes on. Units are SI and radians but for a slope's degrees. Exit
-    code 0: all strides done, or all of --runs; 1: it fell or stumbled; 2: bad input; 3: the machine
-    failed; 130: interrupted.
+    The gait is stabilised as by 'flexspine control'. Heights are measured from the ground below the
+    CoM; the seed draws them, and where in a stride the ground begins. Legs keep their length in the
+    air, so that whether a toe clears a face depends on where in the stride it stands. With --out
+    the first 8 strides are kept in full and drawn, of a run that ended early the last 8; apexes.csv
+    has all. With --runs, distances to the first fall are told; interrupted, the same command goes
+    on. Units are SI and radians but for a slope's degrees.
+
+    Exit code 0: all strides done, or all of --runs; 1: it fell or stumbled; 2: bad input; 3: the
+    machine failed; 130: interrupted.
 
     Examples:
-        flexspine terrain rough --with height=0.008 --out results
+        flexspine terrain rough --with height=0.008 --out rough
 
-        flexspine terrain step --with height=-0.03 --passive
+        flexspine terrain step --with height=-0.03 --json
 
-        flexspine terrain waves --with amplitude=0.01 --with wavelength=2 --runs 200 --out results
+        flexspine terrain waves --with amplitude=0.01 --runs 200 --out waves
     """
     from flexspine.cli.results import ResultDirectory
     from flexspine.control.excerpt import excerpt
@@ -121,12 +130,12 @@ def terrain(
         }
         if runs > 1:
             store = stack.enter_context(kept(out, "terrain"))
-            with counting("runs") as count:
-                ensemble = distance_to_fall(
-                    start.model, steering, where, stride=start.stride_length, strides=strides,
-                    runs=runs, seed=seed, processes=workers, store=store,
-                    progress=count,
-                )  # fmt: skip
+            progress.begin(f"running {runs} times")
+            ensemble = distance_to_fall(
+                start.model, steering, where, stride=start.stride_length, strides=strides,
+                runs=runs, seed=seed, processes=workers, store=store,
+                progress=lambda done, whole: progress.at(done / whole),
+            )  # fmt: skip
             record["ensemble"] = _ensemble_record(ensemble)
         if directory is not None:
             part = excerpt(run)
@@ -145,6 +154,8 @@ def terrain(
 
 
 def _passive(gait: Gait) -> Steering:
+    import numpy as np
+
     from flexspine.control.steering import Fixed
     from flexspine.gaits.problem import ANGLES
 

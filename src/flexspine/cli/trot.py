@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_ROBOT,
     Animation,
     Json,
+    RobotAssignments,
     RobotName,
     RunDirectory,
     Tolerance,
@@ -34,15 +36,6 @@ OF_GAIT = "gait."
 # What a trot writes, in which an earlier one's pictures would pass for its own.
 PICTURES = re.compile(r"(figure|animation|comparison|(com|pd)-.*)\.(png|mp4|gif|csv|nc)")
 
-RobotAssignments = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Set a number of the robot or of the gait, e.g. spine.stiffness=300, gait.speed=0.4.",
-    ),
-]
-
 
 def trot(
     robot: RobotName = DEFAULT_ROBOT,
@@ -51,16 +44,19 @@ def trot(
     controller: Annotated[
         str | None,
         typer.Option(
-            help="tracking (default: computed torque of all joints), qp (the same within friction "
+            metavar="NAME",
+            help="tracking (computed torque of all joints), qp (the same within friction "
             "and limits), com (centre of mass, pitch, swing legs; the spine moves), pd (springs "
-            "and dampers at the joints) or cpg (the same, drawn after coupled oscillators)."
+            "and dampers at the joints) or cpg (the same, drawn after coupled oscillators).",
+            show_default="tracking",
+            autocompletion=completion.among("tracking", "qp", "com", "pd", "cpg"),
         ),
     ] = None,
     rate: Annotated[
         float | None,
         typer.Option(
-            help="Choose torques this often (Hz) and hold them; tracking and pd do without a rate, "
-            "qp and com take 400 Hz if none is given, cpg 1000 Hz."
+            help="Choose torques this often, in Hz, and hold them; tracking and pd do without.",
+            show_default="qp and com 400, cpg 1000",
         ),
     ] = None,
     limit: Annotated[
@@ -68,14 +64,20 @@ def trot(
     ] = None,
     stiffness: Annotated[
         float | None,
-        typer.Option(help="Of the law: in 1/s^2, for pd and cpg in N m/rad (default 400, 300)."),
+        typer.Option(
+            help="Of the law: in 1/s^2, for pd and cpg in N m/rad.",
+            show_default="400, for pd and cpg 300",
+        ),
     ] = None,
     damping: Annotated[
         float | None,
-        typer.Option(help="Of the law: in 1/s, for pd and cpg in N m s/rad (default 40, 4)."),
+        typer.Option(
+            help="Of the law: in 1/s, for pd and cpg in N m s/rad.",
+            show_default="40, for pd and cpg 4",
+        ),
     ] = None,
     push: Annotated[
-        float, typer.Option(help="Push the hind trunk forward by this many N s, half-way.")
+        float, typer.Option(help="A push forward on the hind trunk half-way, in N s.")
     ] = 0.0,
     compare: Annotated[
         bool,
@@ -88,17 +90,18 @@ def trot(
     animation: Animation = True,
     json: Json = False,
 ) -> int:
-    """Let the articulated robot trot from standing, with a flexible spine.
+    """Let the articulated robot trot in the plane, from standing.
 
-    Units are SI and radians. Exit code 0: it stayed up; 1: it did not; 2: bad input; 3: the
-    machine failed; 130: interrupted.
+    Units are SI and radians.
+
+    Exit code 0: it stayed up; 1: it did not; 2: bad input; 3: the machine failed; 130: interrupted.
 
     Examples:
-        flexspine trot --out results/trot
+        flexspine trot --out trot
 
-        flexspine trot --set spine.stiffness=120 --set gait.speed=0.4 --seconds 10 --json
+        flexspine trot --set spine.stiffness=120 --set gait.speed=0.4 --json
 
-        flexspine trot --compare --out results/spines
+        flexspine trot --compare --out spines
     """
     from flexspine.cli.results import ResultDirectory, write_robot_run
     from flexspine.control.laws import Tracking
@@ -117,7 +120,7 @@ def trot(
     made = load_robot(robot, own)
     asked = Trot(
         seconds=seconds,
-        controller=controller or Tracking.name,
+        controller=Tracking.name if controller is None else controller,
         gait=_gait({n.removeprefix(OF_GAIT): v for n, v in given.items() if n not in own}),
         rate=rate,
         limit=limit,
@@ -136,6 +139,7 @@ def trot(
                     "--limit": limit,
                     "--stiffness": stiffness,
                     "--damping": damping,
+                    "--tolerance": tolerance,
                 }
             )
             progress.begin("trotting, six times")

@@ -9,47 +9,71 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli import completion
 from flexspine.cli.kept import kept
-from flexspine.cli.options import DEFAULT_ROBOT, Assignments, Json, RobotName, numbers
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Assignments,
+    Json,
+    Processes,
+    RobotName,
+    Seed,
+    numbers,
+    output_directory,
+)
 from flexspine.cli.output import Steps, print_json, steps
-from flexspine.cli.sweep import Processes, count_of
+from flexspine.cli.sweep import count_of
 
 if TYPE_CHECKING:
     from flexspine.studies.tuning import Tuning
 
 
 def tune(
-    out: Annotated[Path, typer.Option(help="Write the gait and its measures to this directory.")],
-    rhythm: Annotated[str, typer.Option("--gait", help="trot or bound.")] = "trot",
+    out: Annotated[Path, output_directory("the gait and its measures")],
+    rhythm: Annotated[
+        str,
+        typer.Option(
+            "--gait",
+            metavar="NAME",
+            help="trot or bound.",
+            autocompletion=completion.among("trot", "bound"),
+        ),
+    ] = "trot",
     speed: Annotated[float, typer.Option(help="The wanted speed, in m/s.")] = 0.4,
     robot: RobotName = DEFAULT_ROBOT,
     set_: Assignments = None,
     seconds: Annotated[
-        float | None, typer.Option(help="How long walks are tried, in s (default 8).")
+        float | None, typer.Option(help="How long walks are tried, in s.", show_default="8")
     ] = None,
     draws: Annotated[
-        int | None, typer.Option(min=1, help="How many walks are drawn at first (default 128).")
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="How many walks are drawn at first.", show_default="128"
+        ),
     ] = None,
     rounds: Annotated[
-        int | None, typer.Option(min=1, help="How often the best are varied (default 6).")
+        int | None,
+        typer.Option(min=1, metavar="N", help="How often the best are varied.", show_default="6"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 0,
+    seed: Seed = 0,
     processes: Processes = None,
     json: Json = False,
 ) -> int:
-    """Search for the frequency, the posture and the gains with which a robot walks in space.
+    """Search for the gait and the gains of a walk in space.
 
-    Walks are drawn over the ranges of their numbers; the best are varied by ever smaller amounts,
-    24 walks a round, all with a little noise on their sensors (0.005 rad). Best is who does not
-    fall, keeps the wanted speed, and then takes least energy and hits the ground least. The same
-    seed finds the same. Interrupted, the same command goes on. Units are SI and radians. Exit code
-    0: done; 1: all walks fell; 2: bad input; 3: MuJoCo is missing or the machine failed;
+    Frequency, posture and gains of walks are drawn over the ranges of their numbers; the best are
+    varied by ever smaller amounts, 24 walks a round, all with a little noise on their sensors
+    (0.005 rad). Best is who does not fall, keeps the wanted speed, and then takes least energy and
+    hits the ground least. The same seed finds the same. Interrupted, the same command goes on.
+    Units are SI and radians.
+
+    Exit code 0: done; 1: all walks fell; 2: bad input; 3: MuJoCo is missing or the machine failed;
     130: interrupted.
 
     Examples:
-        flexspine tune --gait trot --speed 0.4 --out results/tuned
+        flexspine tune --gait trot --speed 0.4 --out tuned
 
-        flexspine run3d --gait results/tuned/walk.toml
+        flexspine run3d --gait tuned/walk.toml
     """
     from flexspine.cli.results import ResultDirectory, write_json
     from flexspine.engines.installed import mujoco_module

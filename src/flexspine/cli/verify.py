@@ -10,15 +10,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import DEFAULT_ROBOT, Assignments, Json, RobotName, assignments
+from flexspine.cli.options import (
+    DEFAULT_ROBOT,
+    Assignments,
+    Json,
+    RobotName,
+    numbers,
+    output_directory,
+)
 from flexspine.cli.output import Steps, print_json, steps
 from flexspine.cli.verify_engines import engines
 
 if TYPE_CHECKING:
     from flexspine.studies.pinned_check import PinnedCase, PinnedCheck
 
-app = typer.Typer(help="What we compute against engines that others wrote.", no_args_is_help=True)
+app = typer.Typer(help="Compare our motions with MuJoCo's (extra engine).", no_args_is_help=True)
 
 
 @app.callback()
@@ -33,31 +41,38 @@ app.command("engines")(engines)
 def pinned(
     robot: RobotName = DEFAULT_ROBOT,
     foot: Annotated[
-        str | None, typer.Option(help="The foot that is pinned (default: the robot's first).")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="The foot that is pinned.",
+            show_default="the robot's first",
+            autocompletion=completion.feet,
+        ),
     ] = None,
     set_: Assignments = None,
     seconds: Annotated[
-        float | None, typer.Option(help="How long it swings, in s (default 1, from 0.5).")
+        float | None,
+        typer.Option(help="How long it swings, in s, from 0.5 on.", show_default="1"),
     ] = None,
     step: Annotated[
         float | None,
         typer.Option(
-            help="MuJoCo's largest step in s (default 5e-4); of four more each is half the last."
+            help="MuJoCo's largest step, in s; of four more each is half the last.",
+            show_default="5e-4",
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Write a figure, a table and a summary to this directory.")
-    ] = None,
+    out: Annotated[Path | None, output_directory("a figure, a table and a summary")] = None,
     json: Json = False,
 ) -> int:
-    """Pin a robot by one foot, let it go, and compare its motion with MuJoCo's.
+    """Pin a robot by one foot, let it go, and compare with MuJoCo.
 
     Motors are limp, there is no ground, and springs act, first without dampers and then with those
     that the robot has. It starts at rest in a crouch: a level trunk and bent knees. The angles of
     all links have to agree to 1e-6 rad up to 0.5 s at MuJoCo's smallest step, and the difference
-    has to shrink with the fourth power of the step. Units are SI and radians. Exit code 0: they
-    agree; 1: they do not, or the order cannot be told; 2: bad input; 3: MuJoCo is missing, has a
-    version that will not do, or the machine failed; 130: interrupted.
+    has to shrink with the fourth power of the step. Units are SI and radians.
+
+    Exit code 0: they agree; 1: they do not, or the order cannot be told; 2: bad input; 3: MuJoCo is
+    missing, has a version that will not do, or the machine failed; 130: interrupted.
 
     Examples:
         flexspine verify pinned --out results/pinned
@@ -73,7 +88,7 @@ def pinned(
         progress = stack.enter_context(steps())
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         check = check_pinned(
-            load_robot(robot, assignments("--set", set_)),
+            load_robot(robot, numbers("--set", set_)),
             foot,
             seconds=SECONDS if seconds is None else seconds,
             step=STEP if step is None else step,

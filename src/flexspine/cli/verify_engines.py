@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +11,14 @@ import typer
 
 from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
-from flexspine.cli.options import DEFAULT_PRESET, DEFAULT_ROBOT, Json, RobotName
+from flexspine.cli.options import (
+    DEFAULT_PRESET,
+    DEFAULT_ROBOT,
+    Json,
+    Preset,
+    RobotName,
+    output_directory,
+)
 from flexspine.cli.output import print_json, steps
 
 if TYPE_CHECKING:
@@ -31,27 +38,25 @@ WHY_TEMPLATE = (
 
 def engines(
     robot: RobotName = DEFAULT_ROBOT,
-    preset: Annotated[
-        str, typer.Option(help="The flexible bounder that is compared: a preset or a TOML file.")
-    ] = DEFAULT_PRESET,
+    preset: Preset = None,
     seconds: Annotated[float, typer.Option(help="How long the trot is replayed, in s.")] = 2.0,
-    out: Annotated[
-        Path | None, typer.Option(help="Write a figure and a summary to this directory.")
-    ] = None,
+    out: Annotated[Path | None, output_directory("a figure and a summary")] = None,
     json: Json = False,
 ) -> int:
-    """Set three of our motions beside MuJoCo's, and tell where they agree, where not, and why.
+    """Set three motions beside MuJoCo's; tell why they differ.
 
     The robot pinned by a foot and let go; its planar trot replayed by the robot in space that is
-    kept to the plane, on ground ever closer to rigid; and one stride of the bounder, whose massless
-    legs are ever lighter ones in MuJoCo. Units are SI and radians. Exit code 0: all agree as far as
-    they can; 1: they do not; 2: bad input; 3: MuJoCo is missing, has a version that will not do, or
-    the machine failed; 130: interrupted.
+    kept to the plane, on ground ever closer to rigid; and one stride of a flexible bounder, whose
+    massless legs are ever lighter ones in MuJoCo. Units are SI and radians.
+
+    Exit code 0: all agree as far as they can; 1: they do not; 2: bad input; 3: MuJoCo is missing,
+    has a version that will not do, or the machine failed; 130: interrupted.
 
     Examples:
         flexspine verify engines --out results/engines
     """
     from flexspine.cli.results import ResultDirectory, write_json
+    from flexspine.models.model import check_between
     from flexspine.models.presets import load_model
     from flexspine.models.robot_file import load_robot
     from flexspine.report.engines_figure import plot_engines
@@ -60,9 +65,10 @@ def engines(
     from flexspine.studies.template_check import check_template
 
     interruptible()
+    check_between("--seconds", seconds, 0, inf)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        body, animal = load_robot(robot), load_model(preset)
+        body, animal = load_robot(robot), load_model(DEFAULT_PRESET if preset is None else preset)
         directory = None if out is None else stack.enter_context(ResultDirectory(out))
         template = check_template(animal, progress=lambda w: progress.begin(f"bounder: {w}"))
         replay = check_replay(
