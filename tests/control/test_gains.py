@@ -89,6 +89,13 @@ def test_what_is_wrong_with_a_file_is_told_in_one_line(tmp_path: Path, case: str
     assert "mine.toml" in str(raised.value)
 
 
+def test_a_directory_of_results_is_no_walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "trot").mkdir()
+    there = load_walk("trot", "sc618").gains
+    monkeypatch.chdir(tmp_path)
+    assert load_walk("trot", "sc618").gains == there
+
+
 def test_walks_that_are_not_there_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'trot'"):
         load_walk("trott", "sc618")

@@ -116,7 +116,7 @@ def load_walk(walk: str | Path, robot: str) -> Walk:
     Raises `UnknownNameError`, `PresetError` and `ParameterError`.
     """
     name, path = str(walk), Path(walk)
-    if path.suffix == ".toml" or path.exists():
+    if path.suffix == ".toml" or path.is_file():
         try:
             text = path.read_text(encoding="utf-8-sig")
         except (OSError, ValueError) as failure:
