@@ -61,6 +61,8 @@ def test_walks_come_along_for_the_robot() -> None:
 def test_numbers_change_by_dotted_name() -> None:
     walk = load_walk("trot", "sc618").with_values({"gait.frequency": 2.5, "servo.limit": 20.0})
     assert (walk.gains.gait.frequency, walk.gains.servo.limit) == (2.5, 20.0)
+    assert walk.source.of("gait.frequency") == "set by user"
+    assert walk.source.of("gait.duty") == walk.source.source
     with pytest.raises(UnknownNameError, match=r"did you mean 'gait\.speed'"):
         walk.with_values({"gait.sped": 1.0})
     with pytest.raises(ParameterError, match="duty"):
