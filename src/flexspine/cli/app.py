@@ -38,7 +38,7 @@ from flexspine.cli import (
     tune,
     verify,
 )
-from flexspine.cli.output import fail
+from flexspine.cli.output import WORDS, fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
 
 INTERRUPTED = 130
@@ -110,6 +110,7 @@ def _common(
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     as_json = "--json" in arguments
+    WORDS.set(tuple(arguments))
     try:
         code = app(arguments, standalone_mode=False)
     except UsageError as failure:

@@ -78,7 +78,7 @@ def mjcf(
         print(text, end="")
         return 0
     with ExitStack() as stack:
-        directory = stack.enter_context(ResultDirectory(out.parent))
+        directory = stack.enter_context(ResultDirectory(out.parent, tells=False))
         with directory.stage() as stage:
             (stage / out.name).write_text(text, encoding="utf-8")
     print(f"robot in {out}")

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 from rich.console import Console
@@ -23,6 +24,9 @@ from rich.text import Text
 
 from flexspine._version import SCHEMA_VERSION
 from flexspine.errors import FlexspineError
+
+# The words of the command line that runs, without the name of the program.
+WORDS: ContextVar[tuple[str, ...]] = ContextVar("WORDS", default=())
 
 
 def print_json(record: dict[str, Any]) -> None:
