@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from flexspine.report.animation import animate, strip
     from flexspine.report.basin_figure import plot_basin
     from flexspine.report.coordinates_figure import plot_coordinates
+    from flexspine.report.document import write_report
     from flexspine.report.engines_figure import plot_engines
     from flexspine.report.figure import plot_run
     from flexspine.report.map_figure import plot_map
@@ -172,6 +173,7 @@ _HOMES = {
     "tune": "studies.tuning",
     "walk_names": "control.gains",
     "walk_plan": "studies.walk_map",
+    "write_report": "report.document",
 }
 
 __all__ = [
@@ -277,6 +279,7 @@ __all__ = [
     "tune",
     "walk_names",
     "walk_plan",
+    "write_report",
 ]
 
 

@@ -96,7 +96,7 @@ def test_results_are_written_and_readable(cli: Cli, tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "results"
     assert {path.name for path in folder.iterdir()} == {
         "trajectory.nc", "trajectory.csv", "events.csv", "summary.json",
-        "figure.png", "strip.png", "animation.gif", "animation.mp4",
+        "figure.png", "strip.png", "animation.gif", "animation.mp4", "command.txt",
     }  # fmt: skip
     with xr.open_dataset(folder / "trajectory.nc", engine="h5netcdf") as data:
         assert data.attrs["preset"] == "kamimura2015-flexible"

@@ -66,7 +66,7 @@ def test_the_branch_ends_where_a_leg_touches_down_twice(traced: Found) -> None:
 def test_everything_is_written(traced: Found, cli: Cli) -> None:
     folder, record = traced.folder, traced.record
     assert {path.name for path in folder.iterdir()} == {
-        "branch.json", "branch.csv", "branch.png", "start.json",
+        "branch.json", "branch.csv", "branch.png", "start.json", "command.txt",
     }  # fmt: skip
     assert json.loads((folder / "branch.json").read_text()) == record
     assert (folder / "branch.png").read_bytes().startswith(b"\x89PNG")

@@ -192,7 +192,7 @@ def test_robustness_of_bodies(cli: Cli, tmp_path: Path) -> None:
         sides = [each["positive"]["outcomes"], each["negative"]["outcomes"]]
         assert sum(sum(side.values()) for side in sides) == 40
     files = {path.name for path in (tmp_path / "here").iterdir()}
-    assert files == {"push.json", "push.parquet", "push.png"}
+    assert files == {"command.txt", "push.json", "push.parquet", "push.png"}
     again = cli(*asked, "--body", "flexible", "--json")
     flexible = json.loads(again.stdout)["animals"]["flexible"]
     assert flexible == record["animals"]["flexible"]
@@ -210,7 +210,7 @@ def test_limits_of_a_gait(cli: Cli, tmp_path: Path) -> None:
     table = rows(tmp_path / "here" / "limits.csv")
     assert float(table[0]["push_backward"]) == cells[0]["limits"]["push_backward"]
     assert {path.name for path in (tmp_path / "here").iterdir()} == {
-        "limits.csv", "limits.json", "limits.png",
+        "command.txt", "limits.csv", "limits.json", "limits.png",
     }  # fmt: skip
     done = cli("limits", "--stiffness", "260", "--speed", "3", "--only", "step_up")
     assert done.returncode == 1

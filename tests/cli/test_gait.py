@@ -101,7 +101,7 @@ def test_the_published_gait_is_among_them(found: Found) -> None:
 def test_every_gait_is_written_by_itself_and_older_ones_go(found: Found) -> None:
     numbers = range(1, len(found.record["gaits"]) + 1)
     assert {path.name for path in found.folder.iterdir()} == {
-        "gaits.json", "gait-mine.json",
+        "gaits.json", "gait-mine.json", "command.txt",
         *(f"gait-{number}.{kind}" for number in numbers for kind in ("json", "png")),
     }  # fmt: skip
     assert json.loads((found.folder / "gaits.json").read_text()) == found.record

@@ -20,7 +20,10 @@ ALONE = ("--vary", "spine.stiffness=250:280", "--keep", "spine.damping", "--keep
 FORCES = ("--minimise", "peak_grf", "--minimise", "spectral_radius")
 SMALL = ("optimise", *ALONE, *FORCES, "--draws", "0", "--points", "2", "--processes", "1")
 CONSTANT = (*SMALL, "--speed", "4.25", "--spine", "constant")
-FILES = {"optimise.json", "front.csv", "front.parquet", "pareto.png", "gait-reference.json"}
+FILES = {
+    "command.txt", "optimise.json", "front.csv", "front.parquet", "pareto.png",
+    "gait-reference.json",
+}  # fmt: skip
 FIELDS = {
     "gait", "objectives", "varied", "net_work", "dissipated", "relative_drift", "residual",
     "phases", "family", "period", "stable", "floquet_multipliers", "multiplier_errors",

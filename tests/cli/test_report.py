@@ -27,11 +27,27 @@ def test_a_run_becomes_a_page_beside_it(cli: Cli, results: Path) -> None:
     assert done.stdout == told
     page = Page(file.read_text(encoding="utf-8"))
     assert_needs_nothing_else(page)
+    assert "flexspine bound --no-animation --out run" in page.text
     record = json.loads((results / "summary.json").read_text())
     assert {record["duration"], record["mean_speed"]} <= page.numbers
     images = [str(image["src"]) for image in page.of("img")]
     assert len(images) == 2
     assert all(image.startswith("data:image/png;base64,") for image in images)
+
+
+def test_the_command_is_kept_as_it_was_given(cli: Cli, tmp_path: Path) -> None:
+    given = ("bound", "--preset", "scout2", "--no-animation", "--json", "--out", "my run")
+    assert cli(*given).returncode == 0
+    told = "flexspine bound --preset scout2 --no-animation --json --out 'my run'\n"
+    assert (tmp_path / "my run" / "command.txt").read_text() == told
+
+
+def test_what_cannot_be_read_is_named_on_the_page(cli: Cli, results: Path) -> None:
+    (results / "trajectory.nc").write_bytes(b"nothing")
+    done = cli("report", "run")
+    assert (done.returncode, done.stderr) == (0, "")
+    page = Page((results / "report.html").read_text(encoding="utf-8"))
+    assert "cannot read 'run/trajectory.nc'" in page.text
 
 
 def test_again_gives_the_same_and_does_not_show_itself(cli: Cli, results: Path) -> None:

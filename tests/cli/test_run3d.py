@@ -31,8 +31,10 @@ def test_a_run_in_space_is_written_and_told(cli: Cli, tmp_path: Path) -> None:
         "creep": pytest.approx(1.9e-6, rel=0.05),
     }  # fmt: skip
     assert json.loads((tmp_path / "here" / "summary.json").read_text()) == record
-    names = ["animation.gif", "animation.mp4", "figure.png", "summary.json", "trajectory.nc"]
-    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == names
+    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == [
+        "animation.gif", "animation.mp4", "command.txt", "figure.png", "summary.json",
+        "trajectory.nc",
+    ]  # fmt: skip
     with xr.open_dataset(tmp_path / "here" / "trajectory.nc", engine="h5netcdf") as data:
         assert data["com"].shape == (401, 3)
         assert data.attrs["model"] == "articulated robot in space"
@@ -122,7 +124,7 @@ def test_without_opengl_the_film_alone_is_missing(
     assert done.returncode == 3
     assert "neither EGL nor OSMesa" in done.stderr
     assert done.stderr.count("\n") == 1
-    names = ["figure.png", "summary.json", "trajectory.nc"]
+    names = ["command.txt", "figure.png", "summary.json", "trajectory.nc"]
     assert sorted(path.name for path in (tmp_path / "here").iterdir()) == names
 
 
@@ -133,7 +135,8 @@ def test_a_search_writes_a_walk_that_runs(cli: Cli, tmp_path: Path) -> None:
     record = json.loads(done.stdout)
     assert record["tried"] == 2 + 24
     assert record["cost"] == min(record["history"])
-    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == ["tune.json", "walk.toml"]
+    names = ["command.txt", "tune.json", "walk.toml"]
+    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == names
     again = cli("run3d", "--gait", "here/walk.toml", "--seconds", "1", "--json")
     assert json.loads(again.stdout)["gains"] == record["walk"]["gains"]
 
@@ -142,6 +145,7 @@ def test_exported_robots_are_loaded_by_mujoco(cli: Cli, tmp_path: Path) -> None:
     assert (
         cli("export", "mjcf", "--out", "there/a.xml", "--set", "spine.stiffness=99").returncode == 0
     )
+    assert [path.name for path in (tmp_path / "there").iterdir()] == ["a.xml"]
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "there" / "a.xml"))
     assert (model.nv, model.nu) == (19, 12)
     assert model.jnt_stiffness[model.joint("spine").id] == 99

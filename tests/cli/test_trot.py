@@ -76,6 +76,7 @@ def test_results_are_written_and_readable(cli: Cli, tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "trot"
     assert {path.name for path in folder.iterdir()} == {
         "trajectory.nc", "summary.json", "figure.png", "animation.gif", "animation.mp4",
+        "command.txt",
     }  # fmt: skip
     with xr.open_dataset(folder / "trajectory.nc", engine="h5netcdf") as data:
         assert data.attrs["robot"] == "sc618"
@@ -90,7 +91,7 @@ def test_results_are_written_and_readable(cli: Cli, tmp_path: Path) -> None:
     again = cli("trot", "--seconds", "1", "--out", "deep/trot", "--no-animation")
     assert again.returncode == 0
     assert {path.name for path in folder.iterdir()} == {
-        "trajectory.nc", "summary.json", "figure.png",
+        "trajectory.nc", "summary.json", "figure.png", "command.txt",
     }, "an earlier run's pictures are gone"  # fmt: skip
 
 

@@ -39,7 +39,9 @@ def test_the_robot_moves_as_in_mujoco(cli: Cli, tmp_path: Path) -> None:
             assert total == pytest.approx(start["kinetic"] + start["potential"], abs=1e-8)
         assert (end["dissipated"] > 10) is (name == "with dampers")
     out = tmp_path / "results" / "pinned"
-    assert {path.name for path in out.iterdir()} == {"pinned.csv", "pinned.png", "summary.json"}
+    assert {path.name for path in out.iterdir()} == {
+        "command.txt", "pinned.csv", "pinned.png", "summary.json",
+    }  # fmt: skip
     assert json.loads((out / "summary.json").read_text()) == record
     assert (out / "pinned.png").read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader((out / "pinned.csv").read_text().splitlines()))

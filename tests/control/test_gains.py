@@ -61,6 +61,8 @@ def test_walks_come_along_for_the_robot() -> None:
 def test_numbers_change_by_dotted_name() -> None:
     walk = load_walk("trot", "sc618").with_values({"gait.frequency": 2.5, "servo.limit": 20.0})
     assert (walk.gains.gait.frequency, walk.gains.servo.limit) == (2.5, 20.0)
+    assert walk.source.of("gait.frequency") == "set by user"
+    assert walk.source.of("gait.duty") == walk.source.source
     with pytest.raises(UnknownNameError, match=r"did you mean 'gait\.speed'"):
         walk.with_values({"gait.sped": 1.0})
     with pytest.raises(ParameterError, match="duty"):
@@ -87,6 +89,13 @@ def test_what_is_wrong_with_a_file_is_told_in_one_line(tmp_path: Path, case: str
         read(tmp_path, text)
     assert told in str(raised.value)
     assert "mine.toml" in str(raised.value)
+
+
+def test_a_directory_of_results_is_no_walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "trot").mkdir()
+    there = load_walk("trot", "sc618").gains
+    monkeypatch.chdir(tmp_path)
+    assert load_walk("trot", "sc618").gains == there
 
 
 def test_walks_that_are_not_there_are_refused(tmp_path: Path) -> None:

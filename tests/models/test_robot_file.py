@@ -89,8 +89,35 @@ def changed(old: str, new: str) -> str:
     return PENDULUM.replace(old, new)
 
 
+def test_a_description_tells_where_its_numbers_come_from(tmp_path: Path) -> None:
+    text = '[provenance]\n"hinge.stiffness" = "measured"\ngravity = "standard value"\n'
+    robot = described(tmp_path, PENDULUM + text)
+    source = robot.with_values({"rod.mass": 4}).source
+    assert source.of("hinge.stiffness") == "measured"
+    assert source.of("gravity") == "standard value"
+    assert source.of("rod.mass") == "set by user"
+    assert source.of("bob.at") == "the end of rod as described"
+    assert source.of("bob.mass") == f"file {tmp_path / 'mine.toml'}"
+
+
+def test_sc618_admits_what_was_chosen() -> None:
+    source = load_robot("sc618").source
+    for name in ("spine.stiffness", "spine.damping", "spine.rest", "friction", "space.hip_width"):
+        assert source.of(name).startswith("chosen")
+    assert "600 kg/m3" in source.of("hind_trunk.mass")
+
+
 # A description, and what the message has to name.
 BAD = {
+    "the origin of nothing": (
+        PENDULUM + '[provenance]\n"hinge.stifness" = "measured"\n',
+        ("provenance", "did you mean 'hinge.stiffness'"),
+    ),
+    "an origin that is no text": (
+        PENDULUM + '[provenance]\n"hinge.stiffness" = 3\n',
+        ("provenance", "hinge.stiffness", "text"),
+    ),
+    "origins that are no table": ('provenance = "mine"\n' + PENDULUM, ("provenance", "table")),
     "a loop": (changed("[links.rod]", '[links.rod]\nparent = "bob"'), ("links.rod", "loop")),
     "itself": (changed('parent = "rod"', 'parent = "bob"'), ("links.bob", "bob -> bob", "loop")),
     "an orphan": (changed('parent = "rod"', ""), ("links.bob", "no parent")),

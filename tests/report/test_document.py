@@ -22,13 +22,12 @@ from flexspine.control.trot import Trot, trot
 from flexspine.engines.space_dataset import space_dataset
 from flexspine.engines.space_measures import space_record, summarize_space
 from flexspine.engines.space_run import run_in_space
-from flexspine.errors import InputError
 from flexspine.gaits.record import run_record
 from flexspine.models.files import write_netcdf
 from flexspine.models.robot_run import robot_dataset
 from flexspine.report.document import document
+from flexspine.report.page.holdings import MOST_ROWS
 from flexspine.report.page.panels import MOST_POINTS, thinned
-from flexspine.report.page.tables import MOST_ROWS
 from tests.report.pages import Page, assert_needs_nothing_else
 
 SWEEP = """model = "scout2"
@@ -119,6 +118,8 @@ def test_parameters_have_unit_value_and_provenance(bounding: Page, bounder: Path
     assert "spine.stiffness 250 N m/rad" in bounding.text
     assert bounding.text.count("set by user") == 1
     assert "not printed; standard value" in bounding.text
+    assert "Doubt: The lengths printed in the tables" in bounding.text
+    assert "k_t in the flight around the apex default" in bounding.text
 
 
 def test_plots_show_the_data(bounding: Page, bounder: Path) -> None:
@@ -178,6 +179,7 @@ def test_a_robot_in_space_is_shown_from_the_right(in_space: Page, space: Path) -
         expected = data["grf"].sel(foot_name=foot, axis="z")
         assert_drawn(force, expected)
     assert "N/m of the ground under a foot" in in_space.text
+    assert "Hz of strides flexspine tune --gait trot" in in_space.text
 
 
 def test_a_robot_in_the_plane_has_joints_with_references(tmp_path: Path) -> None:
@@ -188,7 +190,9 @@ def test_a_robot_in_the_plane_has_joints_with_references(tmp_path: Path) -> None
     assert_drawn(line_of(page, "Knees", "knee 3")[1], joint)
     (knees,) = [each for each in page.data["run-0-panels"]["panels"] if each["title"] == "Knees"]
     assert [line["dash"] for line in knees["lines"]].count("dot") == 4
-    assert "kg of the foot, a point" in page.text
+    assert "kg of the foot, a point the source" in page.text
+    assert "spine.damping 2 N m s/rad on its rate chosen, see doubts" in page.text
+    assert "gait.stance 0.4 s" in page.text
 
 
 def test_a_run_that_ended_early_is_told_with_advice(tmp_path: Path) -> None:
@@ -228,9 +232,8 @@ def test_text_never_becomes_markup(tmp_path: Path, bounder: Path) -> None:
     (folder / "walk.toml").write_text(evil)
     page = Page(document(folder))
     assert_needs_nothing_else(page)
-    assert (
-        len(page.of("script")) == 6
-    )  # data of the player and the plots, Plotly, and three of ours
+    # Data of the player and the plots, Plotly, and four of ours.
+    assert len(page.of("script")) == 7
     assert not page.of("img")
     assert not page.of("b")
     assert evil in page.text
@@ -286,21 +289,3 @@ def test_a_sweep_is_told_from_its_manifest(tmp_path: Path) -> None:
 
 def test_the_same_results_give_the_same_page(bounder: Path) -> None:
     assert document(bounder) == document(bounder)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "told"),
-    [
-        ("notes.txt", "of somebody", "no results of flexspine"),
-        ("other.json", '{"a": 1}', "no results of flexspine"),
-        ("summary.json", '{"schema_version": 1, ', "cannot read"),
-        ("trajectory.nc", "nothing", "cannot read"),
-        ("manifest.json", "[" * 100_000, "cannot read"),
-    ],
-)
-def test_what_is_not_flexspines_or_broken_is_refused(
-    tmp_path: Path, name: str, content: str, told: str
-) -> None:
-    (tmp_path / name).write_text(content)
-    with pytest.raises(InputError, match=told):
-        document(tmp_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from flexspine import load_model, simulate, to_dataset
+from flexspine import load_model, simulate, to_dataset, write_report
 from flexspine.gaits.record import run_record
 from flexspine.report.document import document
+from tests.report.branches import branch_record
 from tests.report.test_document import write
 
 if TYPE_CHECKING:
@@ -138,3 +140,43 @@ def test_nothing_is_wider_than_a_phone(page: Page) -> None:
     page.set_viewport_size({"width": 390, "height": 800})
     page.wait_for_timeout(300)
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A branch, and a table of two cases with lines that no one can mistake."""
+    folder = tmp_path_factory.mktemp("tables")
+    (folder / "branch.json").write_text(json.dumps(branch_record()))
+    rows = [f"{case},{x},{2 * x},{10.0**x}" for case in "ab" for x in range(5)]
+    (folder / "rows.csv").write_text("\n".join(["case,x,twice,power", *rows]) + "\n")
+    return write_report(folder)
+
+
+def drawn(page: Page) -> list[tuple[str, list[float], list[float]]]:
+    """The lines of the plot of a table: name, across, up."""
+    data = "document.querySelector('.scatter .plot').data"
+    found: list[list[Any]] = page.evaluate(f"{data}.map(one => [one.name ?? '', one.x, one.y])")
+    return [(str(name), across, up) for name, across, up in found]
+
+
+def test_a_branch_and_a_table_are_drawn_as_chosen(
+    browser: Browser, tables: Path, complaints: list[str]
+) -> None:
+    page = browser.new_page(viewport={"width": 1000, "height": 800})
+    page.on("console", lambda said: complaints.append(f"{said.type}: {said.text}"))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(tables.as_uri())
+    page.wait_for_selector(".scatter .main-svg")
+    assert page.locator("[data-branch] .scatterlayer .trace").count() >= 10
+    assert "spine stiffness k_t (N m/rad)" in page.locator("[data-branch] .plot").inner_html()
+    assert drawn(page) == [(case, [0, 1, 2, 3, 4], [0, 2, 4, 6, 8]) for case in "ab"]
+    page.select_option(".scatter select[name=up]", "power")
+    page.select_option(".scatter select[name=scale]", "log up")
+    page.select_option(".scatter select[name=only]", label="case: b")
+    assert drawn(page) == [("b", [0, 1, 2, 3, 4], [1, 10, 100, 1000, 10000])]
+    axis = "document.querySelector('.scatter .plot')._fullLayout.yaxis.type"
+    assert page.evaluate(axis) == "log"
+    page.select_option(".scatter select[name=colour]", "x")
+    assert drawn(page)[0][1] == [0, 1, 2, 3, 4]
+    assert complaints == []
+    page.close()

@@ -42,7 +42,7 @@ from flexspine.cli import (
     tune,
     verify,
 )
-from flexspine.cli.output import fail
+from flexspine.cli.output import WORDS, fail
 from flexspine.errors import OUT_OF_SPACE, FlexspineError, InputError, MachineError
 
 INTERRUPTED = 130
@@ -176,6 +176,7 @@ _compose()
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     as_json = "--json" in arguments
+    WORDS.set(tuple(arguments))
     try:
         code = app(arguments, prog_name=COMMAND, standalone_mode=False)
     except UsageError as failure:

@@ -96,7 +96,7 @@ def mjcf(
         spec.compile()
         text = spec.to_xml()
     if out is not None:
-        with ResultDirectory(out.parent) as directory, directory.stage() as stage:
+        with ResultDirectory(out.parent, tells=False) as directory, directory.stage() as stage:
             (stage / out.name).write_text(text, encoding="utf-8")
     if json:
         told = {"mjcf": text} if out is None else {"file": str(out), "bytes": len(text.encode())}

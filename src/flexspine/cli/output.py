@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 from flexspine._version import SCHEMA_VERSION
@@ -14,6 +15,9 @@ from flexspine.errors import FlexspineError
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, TaskID
+
+# The words of the command line that runs, without the name of the program.
+WORDS: ContextVar[tuple[str, ...]] = ContextVar("WORDS", default=())
 
 
 def print_json(record: dict[str, Any]) -> None:

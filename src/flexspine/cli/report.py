@@ -11,9 +11,6 @@ from flexspine._version import SCHEMA_VERSION, __version__
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
 from flexspine.cli.output import print_json, steps
-from flexspine.errors import OutputError
-
-PAGE = "report.html"
 
 
 def report(
@@ -22,7 +19,7 @@ def report(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.html", help="Write this file.", show_default=f"DIR/{PAGE}"),
+        typer.Option(metavar="FILE.html", help="Write this file.", show_default="DIR/report.html"),
     ] = None,
     json: Json = False,
 ) -> int:
@@ -38,29 +35,20 @@ def report(
 
         flexspine report run --out run.html
     """
-    from flexspine.cli.results import ResultDirectory
-    from flexspine.report.document import document
-    from flexspine.studies.store import write_whole
+    from flexspine.report.document import write_report
 
     interruptible()
-    file = directory / PAGE if out is None else out
-    if file.suffix.lower() not in (".html", ".htm"):
-        raise OutputError(f"cannot write a page as '{file.name}'", "give a name that ends in .html")
-    if file.is_dir():
-        raise OutputError(f"'{file}' is a directory", "give --out another name")
     with steps() as progress:
 
         def show(what: str, share: float) -> None:
             progress.begin(what)
             progress.at(share)
 
-        page = document(directory, leave=file, progress=show).encode()
-        progress.begin("writing")
-        with ResultDirectory(file.parent):
-            write_whole(file, page)
+        file = write_report(directory, out, progress=show)
+    size = file.stat().st_size
     if json:
-        record = {"file": str(file), "bytes": len(page)}
+        record = {"file": str(file), "bytes": size}
         print_json({"schema_version": SCHEMA_VERSION, "flexspine": __version__, **record})
     else:
-        print(f"{file} ({len(page) / 1e6:.1f} MB)")
+        print(f"{file} ({size / 1e6:.1f} MB)")
     return 0

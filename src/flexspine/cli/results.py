@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from flexspine.cli.output import Steps
+from flexspine.cli.output import WORDS, Steps
 from flexspine.errors import OUT_OF_SPACE, OutputError
 
 if TYPE_CHECKING:
@@ -26,12 +27,12 @@ PICTURES = re.compile("|".join(map(re.escape, ("figure.png", "strip.png", *ANIMA
 class ResultDirectory:
     """A place for results; made and tried out at once, so that no run is done in vain.
 
-    A context: what was made for nothing is taken away at its end. Raises `OutputError` if it
-    cannot be written to.
+    A context: what was made for nothing is taken away at its end. Files come with the command that
+    made them unless it ``tells`` nothing. Raises `OutputError` if it cannot be written to.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, *, tells: bool = True) -> None:
+        self.path, self._tells = path, tells
         self._new = [p for p in (path, *path.parents) if not p.exists()]
         try:
             path.mkdir(parents=True, exist_ok=True)
@@ -55,6 +56,8 @@ class ResultDirectory:
         stage = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.path))
         try:
             yield stage
+            if self._tells and WORDS.get():
+                _write_command(stage)
             made = sorted(stage.iterdir())
             for file in made:
                 self._refuse_directory(file.name)
@@ -110,6 +113,14 @@ class ResultDirectory:
 def write_json(record: dict[str, Any], path: Path) -> None:
     """Write a record for people and programs to read."""
     path.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _write_command(stage: Path) -> None:
+    """Write what has to be typed to have these results again."""
+    from flexspine.report.page.reading import COMMAND
+
+    command = shlex.join(["flexspine", *WORDS.get()])
+    (stage / COMMAND).write_text(f"{command}\n", encoding="utf-8")
 
 
 def _write_all(

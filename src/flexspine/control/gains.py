@@ -82,7 +82,9 @@ class Walk:
 
         Raises `UnknownNameError` and `ParameterError`.
         """
-        return Walk(self.name, self.rhythm, replaced(self.gains, changes), self.source)
+        provenance = {**self.source.provenance, **dict.fromkeys(changes, "set by user")}
+        source = replace(self.source, provenance=provenance)
+        return Walk(self.name, self.rhythm, replaced(self.gains, changes), source)
 
     def pattern(self, legs: Mapping[str, Leg]) -> Rhythm:
         """Its rhythm on these legs. Raises `ParameterError` unless two are at each of two hips."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -45,6 +46,16 @@ class Source:
     def of(self, name: str) -> str:
         """Return where the value of ``name`` comes from."""
         return self.provenance.get(name, self.source)
+
+    def attributes(self) -> dict[str, str]:
+        """Return what a dataset keeps of it; lists and tables as JSON."""
+        return {
+            "citation": self.citation,
+            "source": self.source,
+            "notes": json.dumps(self.notes),
+            "doubts": json.dumps(self.doubts),
+            "provenance": json.dumps(dict(self.provenance)),
+        }
 
 
 @dataclass(frozen=True)

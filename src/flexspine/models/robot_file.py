@@ -12,9 +12,11 @@ from typing import Any
 from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.model import Source
 from flexspine.models.robot import SPACE, LegParts, Robot, checked
+from flexspine.parameters import flattened
 
 TABLES = ("links", "joints", "feet")
 LEGS = "legs"
+PROVENANCE = "provenance"
 TEXTS = ("title", "citation", "source")
 LISTS = ("notes", "doubts")
 GROUND = ("gravity", "friction")
@@ -67,15 +69,16 @@ def _parsed(text: str) -> dict[str, Any]:
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as failure:
         raise InputError(f"not valid TOML: {failure}", "mend that line") from None
-    known = (*TABLES, LEGS, SPACE, *TEXTS, *LISTS, *GROUND)
+    known = (*TABLES, LEGS, SPACE, PROVENANCE, *TEXTS, *LISTS, *GROUND)
     for entry in content:
         if entry not in known:
             raise InputError(f"unknown entry '{entry}'", f"known: {', '.join(known)}")
     for entry in TEXTS:
         if not isinstance(content.get(entry, ""), str):
             raise InputError(f"'{entry}' is no text", "put it in quotes")
-    if not isinstance(content.get(SPACE, {}), Mapping):
-        raise InputError(f"'{SPACE}' is not a table", f"write [{SPACE}]")
+    for entry in (SPACE, PROVENANCE):
+        if not isinstance(content.get(entry, {}), Mapping):
+            raise InputError(f"'{entry}' is not a table", f"write [{entry}]")
     for entry in LISTS:
         texts = content.get(entry, [])
         if not (isinstance(texts, list) and all(isinstance(text, str) for text in texts)):
@@ -111,28 +114,42 @@ def _robot(name: str, content: Mapping[str, Any], origin: str) -> Robot:
         for part, entries in parts.items():
             numbers |= {f"{part}.{k}": v for k, v in entries.items() if k not in WORDS[table]}
     # Without a word a link starts at the end of its parent, and a foot is at the end of its link.
-    for link, parent in parents.items():
-        if parent is not None:
-            numbers.setdefault(f"{link}.at", links[parent].get("length"))
-    for foot, entries in feet.items():
-        numbers.setdefault(f"{foot}.at", links[entries["link"]].get("length"))
+    ends = {f"{link}.at": parent for link, parent in parents.items() if parent is not None}
+    ends |= {f"{foot}.at": entries["link"] for foot, entries in feet.items()}
+    ends = {name: link for name, link in ends.items() if name not in numbers}
+    numbers |= {name: links[link].get("length") for name, link in ends.items()}
     wired = {j: (part["link"], part.get("actuated", False)) for j, part in joints.items()}
     standing = {foot: part["link"] for foot, part in feet.items()}
+    numbers = checked(parents, wired, standing, numbers)
+    origins = {name: f"the end of {link} as described" for name, link in ends.items()}
     return Robot(
         name=name,
         parents=parents,
         joints=wired,
         feet=standing,
-        numbers=checked(parents, wired, standing, numbers),
+        numbers=numbers,
         source=Source(
             title=str(content.get("title", name)),
             citation=str(content.get("citation", "")),
             source=str(content.get("source", origin)),
             notes=tuple(content.get("notes", ())),
             doubts=tuple(content.get("doubts", ())),
+            provenance={**origins, **_provenance(content, numbers)},
         ),
         legs={leg: LegParts(**entries) for leg, entries in legs.items()},
     )
+
+
+def _provenance(content: Mapping[str, Any], numbers: Mapping[str, float]) -> dict[str, str]:
+    """Where numbers come from that the source does not tell, by dotted name."""
+    told = flattened(content.get(PROVENANCE, {}))
+    for name, text in told.items():
+        if name not in numbers:
+            unknown = UnknownNameError("parameter", name, numbers)
+            raise InputError(f"{PROVENANCE}: {unknown.message}", unknown.remedy)
+        if not isinstance(text, str):
+            raise InputError(f"{PROVENANCE}.'{name}' is no text", "put it in quotes")
+    return told
 
 
 def _check_names(*tables: Mapping[str, Any]) -> None:

@@ -2,96 +2,109 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexspine.errors import InputError
+from flexspine.report.page.reading import (
+    COMMAND,
+    Table,
+    read_record,
+    read_rows,
+    read_run,
+    read_table,
+)
 from flexspine.studies.store import MANIFEST, PARTIAL, ROWS
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Found = TypeVar("Found")
+
 PICTURES = (".png", ".jpg", ".jpeg")
+FILMS = (".mp4", ".gif")
 TABLES = (".csv", ".parquet")
 
 # What a table of every instant has that the plots do not show.
 TRAJECTORY = "trajectory"
 
+# Rows of a table that are shown; more make a page slow, and nobody reads them.
+MOST_ROWS = 200
 
-@dataclass(frozen=True)
+# Larger films would make the page heavy.
+LARGEST_FILM = 3_000_000  # bytes
+
+
+@dataclass
 class Holdings:
     """What is there, by the names of the files.
 
-    ``records`` and ``gaits`` are JSON objects, ``runs`` datasets, ``texts`` descriptions as TOML,
-    ``others`` are only named.
+    ``records`` and ``gaits`` are JSON objects, ``runs`` datasets, ``texts`` descriptions as TOML;
+    ``rows`` those of a sweep; ``unreadable`` are messages; ``others`` are only named.
     """
 
     path: Path
-    records: dict[str, dict[str, Any]]
-    gaits: dict[str, dict[str, Any]]
-    manifest: dict[str, Any] | None
-    runs: dict[str, xr.Dataset]
-    tables: tuple[Path, ...]
-    pictures: tuple[Path, ...]
-    texts: dict[str, str]
-    others: tuple[Path, ...]
+    command: str = ""
+    manifest: dict[str, Any] | None = None
+    records: dict[str, dict[str, Any]] = field(default_factory=dict)
+    gaits: dict[str, dict[str, Any]] = field(default_factory=dict)
+    runs: dict[str, xr.Dataset] = field(default_factory=dict)
+    tables: dict[str, Table] = field(default_factory=dict)
+    rows: Table | None = None
+    pictures: list[Path] = field(default_factory=list)
+    films: list[Path] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
+    unreadable: dict[str, str] = field(default_factory=dict)
+    others: list[Path] = field(default_factory=list)
 
     @property
-    def rows(self) -> Path | None:
-        """Where a sweep keeps its rows."""
-        rows = self.path / ROWS
-        return rows if self.manifest is not None and rows.is_dir() else None
+    def name(self) -> str:
+        """The name of the directory."""
+        return self.path.resolve().name
+
+    @property
+    def branches(self) -> dict[str, dict[str, Any]]:
+        """The records that are branches of gaits."""
+        return {name: each for name, each in self.records.items() if is_branch(each)}
+
+    @property
+    def models(self) -> dict[str, dict[str, Any]]:
+        """What has parameters and no run of its own: models of a sweep, animals, a robot."""
+        if self.runs:
+            return {}
+        plan = (self.manifest or {}).get("plan", {})
+        found = {str(model.get("name")): model for model in _mappings(plan, "models")}
+        for name, record in self.records.items():
+            animals = record.get("animals")
+            inside = animals if isinstance(animals, dict) else {name: record}
+            found |= {key: each for key, each in inside.items() if _has_parameters(each)}
+        return {name: each for name, each in found.items() if _has_parameters(each)}
 
 
 def survey(path: Path, leave: Path | None = None) -> Holdings:
     """Look into a directory, at all but the file ``leave``.
 
-    Raises `InputError` if nothing of flexspine's is in it, or what is there cannot be read.
+    Raises `InputError` if nothing of flexspine's can be read in it.
     """
     if not path.is_dir():
         raise InputError(f"'{path}' is no directory", "give one that flexspine wrote with --out")
-    records: dict[str, dict[str, Any]] = {}
-    gaits: dict[str, dict[str, Any]] = {}
-    runs: dict[str, xr.Dataset] = {}
-    texts: dict[str, str] = {}
-    manifest, known = None, []
-    left = None if leave is None else leave.resolve()
-    files = [
-        file
-        for file in sorted(path.iterdir())
-        if not file.name.startswith((".", PARTIAL)) and file.resolve() != left
-    ]
+    found = Holdings(path)
+    files = _files(path, leave)
     for file in files:
-        if file.suffix == ".json" and file.is_file():
-            record = _record(file)
-            if record is None:
-                continue
-            if file.name == MANIFEST:
-                manifest = record
-            else:
-                (gaits if is_gait(record) else records)[file.name] = record
-            known.append(file)
-        elif file.suffix == ".nc" and file.is_file():
-            dataset = _run(file)
-            if dataset is not None:
-                runs[file.name] = dataset
-                known.append(file)
-    if not (records or gaits or runs or manifest):
+        _sort_in(found, file)
+    if found.manifest is not None and (path / ROWS).is_dir():
+        found.rows = _read(found, path / ROWS, lambda rows: read_rows(rows, MOST_ROWS))
+        found.others.remove(path / ROWS)
+    if not (found.records or found.gaits or found.runs or found.manifest is not None):
         raise InputError(
-            f"there are no results of flexspine in '{path}'",
+            next(iter(found.unreadable.values()), f"there are no results of flexspine in '{path}'"),
             "give a directory that flexspine wrote with --out",
         )
-    tables = _tables(files)
-    pictures = tuple(file for file in files if file.suffix.lower() in PICTURES and file.is_file())
-    for file in files:
-        if file.suffix == ".toml" and file.is_file():
-            texts[file.name] = file.read_text(encoding="utf-8", errors="replace")
-            known.append(file)
-    shown = {*known, *tables, *pictures, path / ROWS} if manifest else {*known, *tables, *pictures}
-    others = tuple(file for file in files if file not in shown)
-    return Holdings(path, records, gaits, manifest, runs, tables, pictures, texts, others)
+    found.films, large = _lighter(found.films)
+    found.others += large
+    return found
 
 
 def is_gait(record: Any) -> bool:
@@ -99,35 +112,98 @@ def is_gait(record: Any) -> bool:
     return isinstance(record, dict) and {"family", "apex", "touchdown_angles"} <= record.keys()
 
 
-def _record(file: Path) -> dict[str, Any] | None:
-    """A JSON object of flexspine's, None for another's."""
+def is_branch(record: Any) -> bool:
+    """Tell a branch of gaits from all else in records."""
+    return isinstance(record, dict) and {"over", "points", "landmarks"} <= record.keys()
+
+
+def _has_parameters(record: Any) -> bool:
+    return isinstance(record, dict) and isinstance(record.get("parameters"), dict)
+
+
+def _mappings(record: Any, name: str) -> list[dict[str, Any]]:
+    """The mappings in a list of a record."""
+    listed = record.get(name) if isinstance(record, dict) else None
+    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+
+
+def _files(path: Path, leave: Path | None) -> list[Path]:
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as failure:
-        raise InputError(
-            f"cannot read '{file}' ({failure})", "remove it, or make the results anew"
-        ) from None
-    return found if isinstance(found, dict) and "schema_version" in found else None
+        files = sorted(path.iterdir())
+    except OSError as failure:
+        raise InputError(f"cannot read '{path}' ({failure.strerror})", "make it readable") from None
+    left = None
+    if leave is not None and leave.parent.resolve() == path.resolve():
+        left = leave.name
+    return [
+        file for file in files if not file.name.startswith((".", PARTIAL)) and file.name != left
+    ]
 
 
-def _run(file: Path) -> xr.Dataset | None:
-    """A run of flexspine's, None for another dataset."""
-    import xarray as xr
+def _sort_in(found: Holdings, file: Path) -> None:
+    """Read a file if it is of a kind that can be shown, and keep it in its place."""
+    kind = file.suffix.lower()
+    if not file.is_file():
+        found.others.append(file)
+    elif kind == ".json":
+        record = _read(found, file, read_record)
+        if record is None:
+            _name(found, file)
+        elif file.name == MANIFEST:
+            found.manifest = record
+        else:
+            (found.gaits if is_gait(record) else found.records)[file.name] = record
+    elif kind == ".nc":
+        dataset = _read(found, file, read_run)
+        if dataset is None:
+            _name(found, file)
+        else:
+            found.runs[file.name] = dataset
+    elif kind in TABLES and file.stem != TRAJECTORY:
+        table = _read(found, file, lambda each: read_table(each, MOST_ROWS))
+        if table is not None:
+            # Once, where there are several forms of it.
+            found.tables = {n: t for n, t in found.tables.items() if Path(n).stem != file.stem}
+            found.tables[file.name] = table
+    elif kind in (*PICTURES, *FILMS):
+        (found.pictures if kind in PICTURES else found.films).append(file)
+    elif kind == ".toml" or file.name == COMMAND:
+        text = _read(found, file, _text)
+        if file.name == COMMAND:
+            found.command = (text or "").strip()
+        elif text is not None:
+            found.texts[file.name] = text
+    else:
+        found.others.append(file)
 
+
+def _read(found: Holdings, file: Path, read: Callable[[Path], Found | None]) -> Found | None:
+    """What is in a file; one that cannot be read is noted."""
     try:
-        dataset = xr.load_dataset(file, engine="h5netcdf")
-    except (OSError, ValueError, KeyError, RuntimeError) as failure:
-        raise InputError(
-            f"cannot read '{file}' ({failure})", "remove it, or make the results anew"
-        ) from None
-    return dataset if "flexspine_version" in dataset.attrs else None
+        return read(file)
+    except InputError as failure:
+        found.unreadable[file.name] = failure.message
+        return None
 
 
-def _tables(files: list[Path]) -> tuple[Path, ...]:
-    """Tables, once where there are several forms of one; not those of every instant."""
-    found = {
-        file.stem: file
-        for file in files
-        if file.suffix in TABLES and file.stem != TRAJECTORY and file.is_file()
-    }
-    return tuple(found.values())
+def _name(found: Holdings, file: Path) -> None:
+    """Only name a file that is not flexspine's."""
+    if file.name not in found.unreadable:
+        found.others.append(file)
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8", errors="replace")
+    except OSError as failure:
+        raise InputError(f"cannot read '{file}' ({failure.strerror})", "make it readable") from None
+
+
+def _lighter(films: list[Path]) -> tuple[list[Path], list[Path]]:
+    """Films that are shown, of two forms of one the lighter one, and the others."""
+    shown: dict[str, Path] = {}
+    for film in sorted(films, key=lambda each: each.stat().st_size):
+        if film.stat().st_size <= LARGEST_FILM:
+            shown.setdefault(film.stem, film)
+    kept = sorted(shown.values())
+    return kept, [film for film in films if film not in kept]

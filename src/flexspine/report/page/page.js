@@ -5,11 +5,18 @@ const read = (id) => JSON.parse(document.getElementById(id).textContent);
 
 for (const root of document.querySelectorAll("[data-run]")) {
   const player = new Player(root.querySelector(".player"), read(`${root.dataset.run}-reel`));
-  const { panels, spans } = read(`${root.dataset.run}-panels`);
-  const plots = new Plots(root.querySelector(".plots"), panels, spans);
+  const plots = new Plots(root.querySelector(".plots"), read(`${root.dataset.run}-panels`));
   player.listeners.push((time) => plots.mark(time));
   plots.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
   player.show(0);
+}
+
+for (const root of document.querySelectorAll("[data-branch]")) {
+  new Plots(root.querySelector(".plots"), read(root.dataset.branch));
+}
+
+for (const root of document.querySelectorAll("[data-scatter]")) {
+  new Scatter(root, read(root.dataset.scatter));
 }
 
 for (const table of document.querySelectorAll("table.sortable")) {

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from flexspine.control.gains import Gains
+from flexspine.control.gains import Gains, load_walk, walk_names
 from flexspine.models.dataset import VARIABLES
+from flexspine.models.model import Source
+from flexspine.models.presets import load_model, preset_names
 from flexspine.models.registry import KINDS
 from flexspine.models.robot import (
     SPACE,
@@ -17,8 +20,10 @@ from flexspine.models.robot import (
     LinkNumbers,
     SpaceNumbers,
 )
-from flexspine.parameters import ParameterSet, Quantity, quantities
-from flexspine.report.page.markup import Markup, joined, table, tag
+from flexspine.models.robot_file import load_robot, robot_names
+from flexspine.parameters import ParameterSet, Quantity, quantities, values
+from flexspine.report.page.markup import Markup, folded, joined, table, tag
+from flexspine.report.page.words import firm, unit_of
 from flexspine.report.timeline import is_robot
 
 if TYPE_CHECKING:
@@ -30,7 +35,13 @@ HEAD = ("parameter", "value", "unit", "meaning", "where it comes from")
 STARTS = {"height": "com_y", "speed": "com_x_rate"}
 
 # Of a value of which nothing else is noted.
-BY_SOURCE = "the preset's source"
+BY_SOURCE = "the source"
+BY_DEFAULT = "default"
+UNKNOWN = "not recorded"
+
+# Groups of starts, and what is said of those that no preset has.
+APEX, TOUCHDOWN = "apex", "touchdown"
+BY_RECORD = "of this gait"
 
 Row = tuple[str, Any, str, str, str]
 
@@ -43,18 +54,88 @@ def of_run(dataset: xr.Dataset) -> Markup:
         for name in ("parameters", "apex", "touchdown_angles", "provenance", "settings", "gains")
     }
     feet = [str(name) for name in dataset["foot_name"].values] if is_robot(dataset) else []
-    parts = [_source(attrs.get("citation")), of_values(attrs.get("model", ""), given, feet)]
-    for name, title in (("gains", "Numbers of the walk"), ("settings", "What was asked for")):
-        if given[name]:
-            parts += [tag("h4", title), _plain(given[name], _gains() if name == "gains" else {})]
+    parts = [_source(attrs), of_values(attrs.get("model", ""), given, feet)]
+    if given["gains"]:
+        parts += [tag("h4", "Numbers of the walk"), _gains(given["gains"], attrs)]
+    if given["settings"]:
+        rows = [(name, value, unit_of(name)) for name, value in given["settings"].items()]
+        parts += [tag("h4", "What was asked for"), table(("name", "value", "unit"), rows)]
     return joined(parts)
+
+
+def of_record(record: Mapping[str, Any]) -> Markup:
+    """Return the parameters of a gait, a robot, or a model of a sweep, all by their records.
+
+    Its preset or description tells where they come from.
+    """
+    name = record.get("preset", record.get("robot", record.get("name", "")))
+    frame = name if isinstance(name, Mapping) else {}
+    known = _known(str(frame.get("name", name)), record.get("walk"))
+    given: dict[str, dict[str, Any]] = {
+        "parameters": record["parameters"],
+        "apex": record.get("apex", {}),
+        "touchdown_angles": record.get("touchdown_angles", record.get("touchdown", {})),
+    }
+    given["provenance"] = _origins(given, known)
+    whole = of_values(str(record.get("model")), given, frame.get("feet", known.feet))
+    return joined([_source(known.source.attributes()), whole])
 
 
 def of_values(
     model: str, given: Mapping[str, Mapping[str, Any]], feet: Collection[str] = ()
 ) -> Markup:
-    """Return a table of ``parameters``, ``apex`` and ``touchdown_angles`` of a kind of model."""
-    return table(HEAD, _rows(model, given, feet))
+    """Return a table of ``parameters``, ``apex`` and ``touchdown_angles`` of a kind of model.
+
+    Those that are as they would be without a word are folded.
+    """
+    rows = list(_rows(model, given, feet))
+    usual = [row for row in rows if row[-1] == BY_DEFAULT]
+    whole = table(HEAD, [row for row in rows if row[-1] != BY_DEFAULT])
+    if not usual:
+        return whole
+    return joined([whole, folded(f"{len(usual)} parameters at their default", table(HEAD, usual))])
+
+
+class Known(NamedTuple):
+    """What comes with flexspine under a name: nothing under that of anything else."""
+
+    numbers: Mapping[str, float] = {}
+    source: Source = Source("")
+    feet: Collection[str] = ()
+
+
+def _known(name: str, walk: Any) -> Known:
+    """A preset, or a robot with one of its walks."""
+    if name in preset_names():
+        model = load_model(name)
+        return Known(model.numbers, model.source)
+    if name not in robot_names():
+        return Known()
+    robot = load_robot(name)
+    if walk not in walk_names(name):
+        return Known(robot.numbers, robot.source, robot.feet)
+    gains = load_walk(walk, name)
+    numbers = values(gains.gains)
+    told = {**robot.source.provenance, **dict.fromkeys(numbers, gains.source.source)}
+    source = replace(robot.source, provenance=told)
+    return Known({**robot.numbers, **numbers}, source, robot.feet)
+
+
+def _origins(given: Mapping[str, Mapping[str, float]], known: Known) -> dict[str, str]:
+    """Where the values of a record come from, as far as what is known tells."""
+    numbers = known.numbers
+    origins = dict(known.source.provenance)
+    for name, value in given["parameters"].items():
+        if name not in numbers:
+            origins[name] = UNKNOWN
+        elif numbers[name] != value:
+            origins[name] = f"changed from {numbers[name]:g}"
+    for group, before, found in (
+        (APEX, "", given["apex"]), (TOUCHDOWN, f"{TOUCHDOWN}.", given["touchdown_angles"]),
+    ):  # fmt: skip
+        if any(numbers.get(f"{before}{name}") != value for name, value in found.items()):
+            origins[group] = BY_RECORD
+    return origins
 
 
 def _rows(
@@ -68,19 +149,23 @@ def _rows(
     )
     for name, value in given.get("parameters", {}).items():
         about = declared.get(name) or _of_robot(name, feet)
-        unit, meaning = (about.unit, about.meaning) if about else ("", "")
-        yield name, value, unit, meaning, origins.get(name, BY_SOURCE)
+        unit, meaning = (firm(about.unit), about.meaning) if about else ("", "")
+        usual = BY_DEFAULT if about and value == about.default else BY_SOURCE
+        yield name, value, unit, meaning, origins.get(name, usual)
     for name, value in given.get("apex", {}).items():
         unit, meaning = VARIABLES[STARTS.get(name, name)]
-        origin = origins.get("apex", BY_SOURCE)
+        origin = origins.get(APEX, BY_SOURCE)
         yield f"apex.{name}", value, unit, f"{meaning} at the start", origin
     for side, value in given.get("touchdown_angles", {}).items():
         meaning = f"touchdown angle of the {side} leg, from the vertical"
-        yield f"touchdown.{side}", value, "rad", meaning, origins.get("touchdown", BY_SOURCE)
+        yield f"touchdown.{side}", value, "rad", meaning, origins.get(TOUCHDOWN, BY_SOURCE)
 
 
 def _of_robot(name: str, feet: Collection[str]) -> Quantity | None:
-    """What is declared about a number of a robot's part."""
+    """What is declared about a number of a robot's part, or of its walk."""
+    gains = {each.name: each for each in quantities(Gains)}
+    if name in gains:
+        return gains[name]
     part, _, last = name.rpartition(".")
     kinds: tuple[type[ParameterSet], ...] = (LinkNumbers, JointNumbers)
     if not part:
@@ -93,21 +178,23 @@ def _of_robot(name: str, feet: Collection[str]) -> Quantity | None:
     return next(found, None)
 
 
-def _gains() -> dict[str, Quantity]:
-    return {each.name: each for each in quantities(Gains)}
-
-
-def _plain(values: Mapping[str, Any], declared: Mapping[str, Quantity]) -> Markup:
-    if not declared:
-        return table(("name", "value"), values.items())
+def _gains(gains: Mapping[str, Any], attrs: Mapping[str, str]) -> Markup:
+    """The numbers of a walk in space."""
+    declared = {each.name: each for each in quantities(Gains)}
+    origins = json.loads(attrs.get("gains_provenance", "{}"))
+    source = attrs.get("gains_source") or UNKNOWN
     rows = [
-        (name, value, declared[name].unit, declared[name].meaning)
-        if name in declared
-        else (name, value, "", "")
-        for name, value in values.items()
+        (name, value, firm(about.unit), about.meaning, origins.get(name, source))
+        for name, value in gains.items()
+        if (about := declared.get(name))
     ]
-    return table(("name", "value", "unit", "meaning"), rows)
+    return table(HEAD, rows)
 
 
-def _source(citation: str | None) -> Markup:
-    return tag("p", f"Source: {citation}", class_="note") if citation else Markup()
+def _source(attrs: Mapping[str, str]) -> Markup:
+    """What the source is, and what is doubted about it."""
+    known = [attrs[name] for name in ("citation", "source") if attrs.get(name)]
+    told = [f"Source: {'; '.join(dict.fromkeys(known))}"] if known else []
+    for name, word in (("notes", "Note"), ("doubts", "Doubt")):
+        told += [f"{word}: {text}" for text in json.loads(attrs.get(name, "[]"))]
+    return joined(tag("p", text, class_="note") for text in told)

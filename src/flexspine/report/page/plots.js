@@ -1,14 +1,16 @@
-// Draws panels of lines over time with Plotly, and a cursor over them at the player's time.
+// Draws panels of lines with Plotly over time, with a cursor at the player's time, or over
+// another quantity, with what happens along it.
 "use strict";
 
 const PANEL = 190; // px
 const GAP = 52; // px, between panels
 
 class Plots {
-  constructor(root, panels, spans) {
+  constructor(root, { panels, spans, axis }) {
     this.root = root;
     this.panels = panels;
     this.spans = spans;
+    this.axis = axis; // of time, if none is given
     this.plot = root.querySelector(".plot");
     this.cursor = root.querySelector(".cursor");
     this.time = null;
@@ -24,37 +26,44 @@ class Plots {
     const whole = this.panels.length * (PANEL + GAP);
     const traces = [];
     const layout = {
-      height: whole + 30,
-      margin: { l: 62, r: 8, t: 4, b: 26 },
+      height: whole + (this.axis ? 50 : 30),
+      margin: { l: 62, r: 8, t: 4, b: this.axis ? 46 : 26 },
       paper_bgcolor: "rgba(0,0,0,0)",
       plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: ink, family: "system-ui, sans-serif", size: 12 },
-      hovermode: "x unified",
+      hovermode: this.axis ? "closest" : "x unified",
       hoverlabel: { bgcolor: style.getPropertyValue("--paper").trim() },
       annotations: [],
-      shapes: this.spans.map(([start, end, color]) => ({
-        type: "rect", xref: "x", yref: "paper", x0: start, x1: end, y0: 0, y1: 1,
-        fillcolor: color, opacity: 0.25, line: { width: 0 }, layer: "below",
-      })),
+      shapes: [...this.stances(), ...this.landmarks(ink)],
     };
     this.panels.forEach((panel, number) => {
       const suffix = number ? String(number + 1) : "";
       const high = 1 - (number * (PANEL + GAP) + GAP * 0.6) / whole;
       const low = high - PANEL / whole;
       layout[`yaxis${suffix}`] = {
-        domain: [Math.max(0, low), high],
+        domain: [Math.max(0, low), high], type: panel.log ? "log" : "linear",
         gridcolor: faint, zeroline: false, automargin: false,
       };
       layout[`xaxis${suffix}`] = {
         anchor: `y${suffix}`, gridcolor: faint, zeroline: false, hoverformat: ".4f",
-        showticklabels: true, ticks: "outside", tickcolor: "rgba(0,0,0,0)", ticksuffix: " s", ...(number ? { matches: "x" } : {}),
+        showticklabels: true, ticks: "outside", tickcolor: "rgba(0,0,0,0)",
+        ...(this.axis ? {} : { ticksuffix: " s" }), ...(number ? { matches: "x" } : {}),
       };
+      if (this.axis && number === this.panels.length - 1) {
+        layout[`xaxis${suffix}`].title = { text: this.axis.title };
+      }
+      if (panel.level !== undefined) {
+        layout.shapes.push({
+          type: "line", xref: "paper", yref: `y${suffix}`, x0: 0, x1: 1, y0: panel.level,
+          y1: panel.level, line: { color: ink, width: 1, dash: "dash" },
+        });
+      }
       layout[`legend${suffix}`] = {
         orientation: "h", x: 1, xanchor: "right", y: high, yanchor: "bottom",
         bgcolor: "rgba(0,0,0,0)",
       };
       layout.annotations.push({
-        text: `<b>${panel.title}</b> (${panel.unit})`, xref: "paper", yref: "paper", x: 0, y: high,
+        text: `<b>${panel.title}</b>${panel.unit && ` (${panel.unit})`}`, xref: "paper", yref: "paper", x: 0, y: high,
         xanchor: "left", yanchor: "bottom", showarrow: false,
       });
       for (const line of panel.lines) {
@@ -70,6 +79,21 @@ class Plots {
     Plotly.react(this.plot, traces, layout, {
       responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"],
     });
+  }
+
+  // Tints of the legs that stand.
+  stances() {
+    return this.spans.map(([start, end, color]) => ({
+      type: "rect", xref: "x", yref: "paper", x0: start, x1: end, y0: 0, y1: 1,
+      fillcolor: color, opacity: 0.25, line: { width: 0 }, layer: "below",
+    }));
+  }
+
+  landmarks(ink) {
+    return ((this.axis && this.axis.marks) || []).map((value) => ({
+      type: "line", xref: "x", yref: "paper", x0: value, x1: value, y0: 0, y1: 1,
+      line: { color: ink, width: 1, dash: "dot" }, layer: "below",
+    }));
   }
 
   // Puts the cursor at a time in s; it is hidden outside of what is shown.

@@ -36,20 +36,24 @@ def run_section(dataset: xr.Dataset, name: str) -> Markup:
         *([tag("p", f"Ended early: {early}", class_="outcome bad")] if early else []),
         *(tag("p", line, class_="note") for line in excerpt_of(dataset)),
     ]
-    found = {"panels": panels.as_data(dataset), "spans": _spans(dataset)}
-    plots = tag(
+    found = {"panels": panels.as_data(dataset), "spans": _spans(dataset), "axis": None}
+    return joined(
+        [
+            *about,
+            tag("div", _player(is_robot(dataset)), plots_area(), data_run=name),
+            data(f"{name}-reel", reel(dataset)),
+            data(f"{name}-panels", found),
+        ]
+    )
+
+
+def plots_area() -> Markup:
+    """Where scripts draw panels of lines, with a cursor over them."""
+    return tag(
         "div",
         tag("div", class_="plot"),
         tag("div", class_="cursor", hidden=""),
         class_="plots",
-    )
-    return joined(
-        [
-            *about,
-            tag("div", _player(is_robot(dataset)), plots, data_run=name),
-            data(f"{name}-reel", reel(dataset)),
-            data(f"{name}-panels", found),
-        ]
     )
 
 
