@@ -20,23 +20,24 @@ Result = subprocess.CompletedProcess[str]
 Cli = Callable[..., Result]
 
 
+def run_here(*arguments: str | Path) -> Result:
+    """Run the command line in this process, where all is compiled."""
+    words, out, err = [*map(str, arguments)], StringIO(), StringIO()
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        with redirect_stdout(out), redirect_stderr(err):
+            code = run(words)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return Result(words, code, out.getvalue(), err.getvalue())
+
+
 @pytest.fixture
 def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Cli:
-    """Run the command line in an empty directory; in this process, where all is compiled."""
+    """Run the command line in an empty directory."""
     monkeypatch.chdir(tmp_path)
-
-    def within(*arguments: str | Path) -> Result:
-        words, out, err = [*map(str, arguments)], StringIO(), StringIO()
-        before = {number: signal.getsignal(number) for number in SIGNALS}
-        try:
-            with redirect_stdout(out), redirect_stderr(err):
-                code = run(words)
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-        return Result(words, code, out.getvalue(), err.getvalue())
-
-    return within
+    return run_here
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 
 from flexspine import examine, load_model, trace_branch
 from flexspine.report.branch_figure import plot_branch
-from tests.cli.conftest import COMMAND, Cli
+from tests.cli.conftest import COMMAND, Cli, run_here
 from tests.cli.test_gait import FIELDS, Found, assert_one_clear_line
 from tests.report.layout import assert_no_text_overlaps
 
@@ -27,12 +27,7 @@ LONG = (*RANGE, "--longest-step", "0.008")
 def traced(tmp_path_factory: pytest.TempPathFactory) -> Found:
     """The branch of the published gait over speed."""
     folder = tmp_path_factory.mktemp("branch")
-    done = subprocess.run(
-        [COMMAND, "branch", *RANGE, "--out", folder, "--json"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    done = run_here("branch", *RANGE, "--out", folder, "--json")
     return Found(done, json.loads(done.stdout), folder)
 
 
@@ -131,12 +126,7 @@ DAMPED = (
 def damped(tmp_path_factory: pytest.TempPathFactory) -> Found:
     """The published gait over damping, kept going by legs that get longer."""
     folder = tmp_path_factory.mktemp("damped")
-    done = subprocess.run(
-        [COMMAND, "branch", *DAMPED, "--out", folder, "--json"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    done = run_here("branch", *DAMPED, "--out", folder, "--json")
     return Found(done, json.loads(done.stdout), folder)
 
 

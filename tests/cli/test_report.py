@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
 from flexspine.studies import store
-from tests.cli.conftest import Cli
+from tests.cli.conftest import Cli, run_here
 from tests.cli.test_gait import assert_one_clear_line
 from tests.report.pages import Page, assert_needs_nothing_else
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a run leaves behind; tests take a copy."""
+    folder = tmp_path_factory.mktemp("made") / "run"
+    assert run_here("bound", "--no-animation", "--out", folder).returncode == 0
+    return folder
+
+
 @pytest.fixture
-def results(cli: Cli, tmp_path: Path) -> Path:
-    assert cli("bound", "--no-animation", "--out", "run").returncode == 0
-    return tmp_path / "run"
+def results(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "run"))
 
 
 def test_a_run_becomes_a_page_beside_it(cli: Cli, results: Path) -> None:
@@ -27,7 +35,7 @@ def test_a_run_becomes_a_page_beside_it(cli: Cli, results: Path) -> None:
     assert done.stdout == told
     page = Page(file.read_text(encoding="utf-8"))
     assert_needs_nothing_else(page)
-    assert "flexspine bound --no-animation --out run" in page.text
+    assert "flexspine bound --no-animation --out" in page.text
     record = json.loads((results / "summary.json").read_text())
     assert {record["duration"], record["mean_speed"]} <= page.numbers
     images = [str(image["src"]) for image in page.of("img")]

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from tests.cli.conftest import COMMAND, Cli
+from tests.cli.conftest import Cli, run_here
 
 FIELDS = {
     "schema_version", "robot", "outcome", "message", "advice", "duration", "settings", "spine",
@@ -196,11 +194,7 @@ def test_a_directory_that_cannot_be_written_to_is_refused_first(cli: Cli, tmp_pa
 def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """What is printed and written by a comparison, which is made once for all tests."""
     folder = tmp_path_factory.mktemp("compared")
-    done = subprocess.run(
-        [COMMAND,
-         "trot", "--compare", "--seconds", "2", "--out", "spines"],
-        cwd=folder, env=dict(os.environ), capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+    done = run_here("trot", "--compare", "--seconds", "1", "--out", folder / "spines")
     assert done.returncode == 0, done.stderr
     return done.stdout, folder / "spines"
 

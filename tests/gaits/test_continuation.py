@@ -25,7 +25,7 @@ from flexspine import (
 from flexspine.errors import ParameterError, UnknownNameError
 from tests import second_implementation as reference
 from tests.conftest import reference_rows
-from tests.gaits.test_return_map import DAMPERS, difference
+from tests.gaits.test_return_map import difference
 
 CURVES = reference_rows("kamimura2015_fig4.csv")
 
@@ -536,7 +536,8 @@ def test_what_cannot_be_followed_is_refused_with_a_remedy(
 
 
 def test_a_damped_stride_is_on_no_branch() -> None:
-    damped = examine(load_model("kamimura2015-flexible", DAMPERS))
+    dampers = {"fore.leg.damping": 8.0, "hind.leg.damping": 5.0}
+    damped = examine(load_model("kamimura2015-rigid", dampers))
     with pytest.raises(ParameterError, match="cannot start here; start it from a gait"):
         trace_branch(damped, bounds=(4.0, 5.0), fixed={"height": 0.32})
 

@@ -28,7 +28,7 @@ from flexspine.models.simulation import DEFAULT_TOLERANCE
 from flexspine.parameters import values
 from tests import second_implementation as reference
 from tests.conftest import reference_rows
-from tests.gaits.test_return_map import Make, difference
+from tests.gaits.test_return_map import Make, difference, there
 from tests.models.test_reference_tables import SLIP
 from tests.models.test_second_implementation import flexible, rigid
 
@@ -228,7 +228,9 @@ def test_a_stride_that_loses_energy_has_no_multiplier_one(name: str) -> None:
     dampers = {"fore.leg.damping": 20.0, "hind.leg.damping": 20.0}
     if name.endswith("flexible"):
         dampers["spine.damping"] = 1.0
-    stride = stride_map(load_model(name, dampers))
+    model = load_model(name, dampers)
+    # By parameters as well: code that other tests compile.
+    stride = stride_map(model, parameters=there(model, damped=True))
     assert np.abs(np.linalg.eigvals(stride.by_state) - 1).min() > 0.01
 
 

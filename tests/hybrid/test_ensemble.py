@@ -388,6 +388,8 @@ def test_rare_ends_do_not_depend_on_the_size_of_the_pool(
 ) -> None:
     """Long flights, and legs so stiff and damped that events crowd."""
     model = load_model("kamimura2015-flexible", change)
+    if "fore.leg.damping" in change:
+        model = model.keeping(["spine.damping"])  # equations that other tests compile as well
     starts = animals(model, 40, 6, 0.03)
     whole = many(model.system, starts, 1)
     if what == "no_apex":

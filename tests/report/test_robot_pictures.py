@@ -37,9 +37,24 @@ def runs() -> dict[str, xr.Dataset]:
     return {name: robot_dataset(trot(load_robot("sc618"), RUNS[name])) for name in RUNS}
 
 
+@pytest.fixture(scope="module")
+def figures(runs: dict[str, xr.Dataset]) -> dict[str, Figure]:
+    return {name: plot_robot(run) for name, run in runs.items()}
+
+
 @pytest.fixture(params=sorted(RUNS))
-def data(runs: dict[str, xr.Dataset], request: pytest.FixtureRequest) -> xr.Dataset:
-    return runs[request.param]
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def data(runs: dict[str, xr.Dataset], name: str) -> xr.Dataset:
+    return runs[name]
+
+
+@pytest.fixture
+def figure(figures: dict[str, Figure], name: str) -> Figure:
+    return figures[name]
 
 
 def labelled(figure: Figure, label: str) -> Axes:
@@ -74,15 +89,13 @@ def test_the_runs_are_what_the_tests_need(runs: dict[str, xr.Dataset]) -> None:
     assert (runs["pd"].slides != 0).any()
 
 
-def test_text_stays_inside_and_apart(data: xr.Dataset) -> None:
-    figure = plot_robot(data)
+def test_text_stays_inside_and_apart(figure: Figure) -> None:
     assert_no_text_overlaps(figure)
     assert_all_inside(figure)
     assert_axes_apart(figure)
 
 
-def test_every_axis_has_a_unit(data: xr.Dataset) -> None:
-    figure = plot_robot(data)
+def test_every_axis_has_a_unit(figure: Figure) -> None:
     labels = [text for axes in figure.axes for text in (axes.get_ylabel(), axes.get_xlabel())]
     assert sum(bool(label) for label in labels) >= 9
     for label in filter(None, labels):
@@ -90,8 +103,10 @@ def test_every_axis_has_a_unit(data: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("joint", ["hip_1", "knee_1", "hip_3", "knee_3"])
-def test_joints_are_drawn_as_they_are_and_as_wanted(data: xr.Dataset, joint: str) -> None:
-    axes = labelled(plot_robot(data), f"{joint.replace('_', ' ')} (°)")
+def test_joints_are_drawn_as_they_are_and_as_wanted(
+    data: xr.Dataset, figure: Figure, joint: str
+) -> None:
+    axes = labelled(figure, f"{joint.replace('_', ' ')} (°)")
     real, wanted = axes.get_lines()
     shown = data.isel(time=slice(0, len(real.get_xdata())))
     np.testing.assert_array_equal(real.get_xdata(), shown.time)
@@ -102,8 +117,10 @@ def test_joints_are_drawn_as_they_are_and_as_wanted(data: xr.Dataset, joint: str
 
 
 @pytest.mark.parametrize(("label", "axis"), [("normal", "y"), ("tangential", "x")])
-def test_forces_are_those_of_the_first_legs(data: xr.Dataset, label: str, axis: str) -> None:
-    lines = labelled(plot_robot(data), label).get_lines()
+def test_forces_are_those_of_the_first_legs(
+    data: xr.Dataset, figure: Figure, label: str, axis: str
+) -> None:
+    lines = labelled(figure, label).get_lines()
     for line, foot in zip(lines, ("toe_1", "toe_3"), strict=True):
         one = data.sel(foot_name=foot, axis=axis)
         stands = one.stands.values > 0
@@ -112,9 +129,11 @@ def test_forces_are_those_of_the_first_legs(data: xr.Dataset, label: str, axis: 
         np.testing.assert_array_equal(drawn[stands], one.grf.values[stands])
 
 
-def test_impulses_are_marked_where_feet_hit(runs: dict[str, xr.Dataset]) -> None:
+def test_impulses_are_marked_where_feet_hit(
+    runs: dict[str, xr.Dataset], figures: dict[str, Figure]
+) -> None:
     data = runs["tracking"]
-    twins = [axes for axes in plot_robot(data).axes if "impulse" in axes.get_ylabel()]
+    twins = [axes for axes in figures["tracking"].axes if "impulse" in axes.get_ylabel()]
     assert len(twins) == 2
     for axes, axis in zip(twins, ("y", "x"), strict=True):
         for line, foot in zip(axes.get_lines(), ("toe_1", "toe_3"), strict=True):
@@ -126,8 +145,8 @@ def test_impulses_are_marked_where_feet_hit(runs: dict[str, xr.Dataset]) -> None
             assert (abs(got) <= axes.get_ylim()[1]).all()
 
 
-def test_bars_cover_the_time_a_foot_stands(data: xr.Dataset) -> None:
-    bars = plot_robot(data).axes[0]
+def test_bars_cover_the_time_a_foot_stands(data: xr.Dataset, figure: Figure) -> None:
+    bars = figure.axes[0]
     step = 0.001  # s, between the samples
     assert [label.get_text() for label in bars.get_yticklabels()] == [
         "hind 1", "hind 2", "fore 1", "fore 2",
@@ -142,8 +161,7 @@ def test_bars_cover_the_time_a_foot_stands(data: xr.Dataset) -> None:
             )
 
 
-def test_com_and_trunk_are_drawn(data: xr.Dataset) -> None:
-    figure = plot_robot(data)
+def test_com_and_trunk_are_drawn(data: xr.Dataset, figure: Figure) -> None:
     (height,) = labelled(figure, "CoM height").get_lines()
     np.testing.assert_array_equal(height.get_ydata(), data.com.sel(axis="y"))
     (ahead,) = labelled(figure, "ahead").get_lines()
@@ -176,8 +194,8 @@ def test_of_a_long_run_the_last_four_cycles_are_shown(runs: dict[str, xr.Dataset
     assert plot_robot(data).axes[0].get_xlim() == pytest.approx((0.5, 1.3))
 
 
-def test_a_fall_is_told(runs: dict[str, xr.Dataset]) -> None:
-    words = " ".join(text for text, _ in text_boxes(plot_robot(runs["fallen"])))
+def test_a_fall_is_told(runs: dict[str, xr.Dataset], figures: dict[str, Figure]) -> None:
+    words = " ".join(text for text, _ in text_boxes(figures["fallen"]))
     assert runs["fallen"].outcome.replace("_", " ") in words
 
 
@@ -314,23 +332,27 @@ def test_drawing_leaves_the_data_alone(runs: dict[str, xr.Dataset]) -> None:
     xr.testing.assert_identical(data, before)
 
 
-def test_coordinates_are_all_named() -> None:
+@pytest.fixture(scope="module")
+def coordinates() -> Figure:
+    return plot_coordinates(load_robot("sc618"))
+
+
+def test_coordinates_are_all_named(coordinates: Figure) -> None:
     robot = load_robot("sc618")
-    figure = plot_coordinates(robot)
-    words = [text for text, _ in text_boxes(figure)]
+    words = [text for text, _ in text_boxes(coordinates)]
     named = [f"$q_{{{n}}}$ {name}" for n, name in enumerate(robot.joints, start=2)]
     for text in ["$q_1$", *named, "$q_{11}$", "$q_{12}$", *robot.parents, *robot.feet]:
         assert words.count(text) == 1, text
-    assert_no_text_overlaps(figure)
-    assert_all_inside(figure)
+    assert_no_text_overlaps(coordinates)
+    assert_all_inside(coordinates)
 
 
-def test_arcs_turn_from_the_parent_to_the_link() -> None:
+def test_arcs_turn_from_the_parent_to_the_link(coordinates: Figure) -> None:
     robot = load_robot("sc618")
     q, linkage = told_apart(robot), robot.linkage
     arcs = [
         np.asarray(line.get_xydata())
-        for line in plot_coordinates(robot).axes[0].get_lines()
+        for line in coordinates.axes[0].get_lines()
         if line.get_color() == "#0072B2"
     ]
     assert len(arcs) == len(robot.parents)

@@ -172,8 +172,8 @@ def test_published_robots_take_as_long_as_published(do: Doing) -> None:
     [
         "speed = {around = 0.02, steps = 24}",
         # Terms without a damper are left out of a system, but not where others of a sweep have one.
-        "spine.damping = [0.0, 0.5]\nspeed = {around = 0.02, steps = 12}",
-        "fore.leg.damping = [3.0, 0.0]\nspeed = {around = 0.02, steps = 12}",
+        "spine.damping = [0.0, 0.5]\nfore.leg.damping = [3.0]\nspeed = {around = 0.02, steps = 12}",
+        "fore.leg.damping = [3.0, 0.0]\nspine.damping = [0.5]\nspeed = {around = 0.02, steps = 12}",
     ],
 )
 def test_rows_do_not_depend_on_the_chunk_they_are_in(do: Doing, axes: str) -> None:
