@@ -16,7 +16,8 @@ import sympy as sp
 
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.gaits.return_map import section_rows
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import HybridSystem, Mode

@@ -22,7 +22,8 @@ from flexspine.control.references import (
     references,
 )
 from flexspine.control.walk_plan import STEP, SWING_END, Pace, Walk
-from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState

@@ -17,7 +17,8 @@ import numpy as np
 
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.gaits.parameter_scale import ParameterScale
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.functions import balance, section_quantities
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome

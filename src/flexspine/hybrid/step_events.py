@@ -21,8 +21,8 @@ from flexspine.hybrid.compile import (
     Jump,
     compile_expressions,
 )
+from flexspine.hybrid.events import GRAZING_RATE, SIMULTANEITY, ZERO
 from flexspine.hybrid.grazing import GRAZING_DEPTH
-from flexspine.hybrid.integrate import GRAZING_RATE, SIMULTANEITY, ZERO
 from flexspine.hybrid.system import Guard, Mode
 
 Indices = NDArray[np.intp]

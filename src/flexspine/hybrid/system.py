@@ -17,7 +17,7 @@ import sympy as sp
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
-    from flexspine.hybrid.compile import BoundSystem
+    from flexspine.hybrid.bound import BoundSystem
     from flexspine.hybrid.trajectory import HybridState
 
 # From where a guard fired to where the run goes on, or how it ends; None: nothing happens.

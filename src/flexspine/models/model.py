@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from flexspine.errors import ParameterError, UnknownNameError
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.actuation import ACTUATORS, BARE, HIP_LEVER, Features

@@ -8,8 +8,9 @@ from math import inf
 from numbers import Integral
 
 from flexspine.errors import ParameterError, StateError
-from flexspine.hybrid.compile import BoundSystem
-from flexspine.hybrid.integrate import MAX_STEPS, ZERO, integrate
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.events import ZERO
+from flexspine.hybrid.integrate import MAX_STEPS, integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
