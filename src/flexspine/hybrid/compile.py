@@ -143,7 +143,7 @@ class CompiledSystem:
             field, start, tol=self.tolerance, t_events=events, compact_mode=system.large
         )
         kernel, jumps = self._event_kernel(mode)
-        # Of a large system nothing is folded, which takes longer than it saves.
+        # Folding a large system takes longer than it saves.
         coefficients = _as_they_are if system.large else self.coefficients(lower.coefficients)
         return CompiledMode(mode, integrator, coefficients, kernel, jumps)
 
