@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexspine.engines.installed import LEAST_INERTIA, mujoco_module, unheard
-from flexspine.mechanics.linkage import Array, Link, Linkage
+from flexspine.engines.installed import LEAST_INERTIA, empty_specification, mujoco_module, unheard
+from flexspine.mechanics.linkage import Array, Linkage
 from flexspine.mechanics.rerooting import rerooted
 
 
@@ -78,19 +78,13 @@ def pinned_specification(mujoco: Any, linkage: Linkage, foot: str) -> Any:
     Our plane is that of its x and y, gravity acts against y. Raises `UnknownNameError`.
     """
     tree = rerooted(linkage, foot)
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec = empty_specification(mujoco, (0.0, -tree.gravity, 0.0))
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.gravity = [0.0, -tree.gravity, 0.0]
-    off = mujoco.mjtDisableBit
-    # A run that diverged is not to begin anew behind our back.
-    spec.option.disableflags = int(off.mjDSBL_CONSTRAINT | off.mjDSBL_AUTORESET)
-    spec.option.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     joints = {joint.link: joint for joint in tree.joints}
     bodies: dict[str | None, Any] = {None: spec.worldbody}
     for link in tree.links:
-        mass, com, inertia = _with_feet(tree, link)
+        mass, com, inertia = tree.with_feet(link.name)
         body = bodies[link.name] = bodies[link.parent].add_body(
             name=link.name,
             pos=[link.at, 0.0, 0.0],
@@ -109,12 +103,3 @@ def pinned_specification(mujoco: Any, linkage: Linkage, foot: str) -> Any:
             hinge.stiffness, hinge.damping = [joint.stiffness, 0, 0], [joint.damping, 0, 0]
             hinge.springref = joint.rest
     return spec
-
-
-def _with_feet(tree: Linkage, link: Link) -> tuple[float, float, float]:
-    """Mass, centre of mass and inertia about it of a link with its feet, which are points."""
-    parts = [(link.mass, link.com, link.inertia)]
-    parts += [(foot.mass, foot.at, 0.0) for foot in tree.feet if foot.link == link.name]
-    mass = sum(part for part, _, _ in parts)
-    com = sum(part * at for part, at, _ in parts) / mass
-    return mass, com, sum(own + part * (at - com) ** 2 for part, at, own in parts)

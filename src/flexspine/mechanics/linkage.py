@@ -124,6 +124,15 @@ class Linkage:
         masses, arms = zip(*points, strict=True)
         return np.array(masses), np.array(arms)
 
+    def with_feet(self, link: str) -> tuple[float, float, float]:
+        """Mass of a link with its feet, their centre from its start, and inertia about that."""
+        body = self.links[self.place[link]]
+        parts = [(body.mass, body.com, body.inertia)]
+        parts += [(foot.mass, foot.at, 0.0) for foot in self.feet if foot.link == link]
+        mass = sum(part for part, _, _ in parts)
+        com = sum(part * at for part, at, _ in parts) / mass
+        return mass, com, sum(own + part * (at - com) ** 2 for part, at, own in parts)
+
     @cached_property
     def mass(self) -> float:
         """The whole mass, in kg."""
