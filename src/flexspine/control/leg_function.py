@@ -19,11 +19,12 @@ class LegFunction:
     """The joints of a robot with a level trunk, from where its feet are.
 
     Places and velocities of feet have shape (legs, 2), in the order of the legs, x forward, y up,
-    from the middle between the hips.
+    from the middle between the hips, whose own places are ``hips``.
     """
 
     def __init__(self, robot: Robot, legs: Mapping[str, Leg]) -> None:
         self._robot, self._legs = robot, legs
+        self.hips = np.array([[leg.hip, 0.0] for leg in legs.values()])
         still = sp.zeros(2, 1)
         feet, inputs = {}, []
         for leg in legs:
