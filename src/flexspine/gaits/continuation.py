@@ -76,7 +76,7 @@ def trace_branch(
     longest_step: float = LONGEST_STEP,
     most_points: int = MOST_POINTS,
     store: str | Path | None = None,
-    progress: Callable[[BranchPoint], None] = lambda _: None,
+    progress: Callable[[BranchPoint], None] | None = None,
 ) -> Branch:
     """Follow the branch of a gait in ``over`` both ways, until it ends or leaves ``bounds``.
 
@@ -106,7 +106,7 @@ def trace_branch(
         for state in tracer.go(tracing):
             if checkpoint is not None:
                 checkpoint.add(way, tracing, state)
-            if len(state.points) > len(tracing.points):
+            if progress is not None and len(state.points) > len(tracing.points):
                 progress(state.points[-1])
             tracing = state
         halves.append(tracing)

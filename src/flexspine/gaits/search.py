@@ -83,7 +83,7 @@ def find_gaits(
     seed: int = 0,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] | None = None,
 ) -> Search:
     """Find all gaits of a model with some quantities fixed, from seeded random starts.
 
@@ -109,7 +109,8 @@ def find_gaits(
         sampler = Sampler(problem, np.random.default_rng(seed), ranges)
         for count in range(starts):
             _try(problem, sampler, found, tally)
-            progress((number + (count + 1) / starts) / len(problems))
+            if progress is not None:
+                progress((number + (count + 1) / starts) / len(problems))
         dropped.update(sampler.dropped)
     found.sort(key=lambda gait: (not gait.symmetric, gait.family, gait.model.touchdown["fore"]))
     return Search(tuple(found), dict(tally), dict(dropped))

@@ -103,7 +103,7 @@ def simulate_many(
     strides: int = 1,
     tolerance: float = DEFAULT_TOLERANCE,
     processes: int = 1,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] | None = None,
 ) -> Ensemble:
     """Simulate ``strides`` strides of many animals at once, each from its own apex.
 
@@ -124,7 +124,8 @@ def simulate_many(
     workers = min(check_count("processes", processes), len(parts))
     for piece in _stream(map(cases.piece, parts), strides, tolerance, workers):
         pieces.append(piece.columns)
-        progress(len(pieces) / len(parts))
+        if progress is not None:
+            progress(len(pieces) / len(parts))
     columns = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
     return Ensemble(cases, strides, tolerance, columns)
 

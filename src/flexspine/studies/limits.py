@@ -136,7 +136,7 @@ def find_limits(
     limits: Sequence[Limit] = LIMITS,
     processes: int = 1,
     store: Path | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Cell]:
     """Find the limits of the model's gait at every spine stiffness (N m/rad) and mean speed (m/s).
 

@@ -94,7 +94,7 @@ def optimise(
     seed: int = 0,
     store: str | Path | None = None,
     processes: int = 1,
-    progress: Progress = lambda _what, _share: None,
+    progress: Progress | None = None,
 ) -> Optimisation:
     """Find the gaits at a mean speed that are best in two objectives, with both kinds of spines.
 
@@ -134,7 +134,8 @@ def optimise(
         found = _search(frontiers, points, draws, seed)
     fronts = {}
     for (spine, design), best in zip(designs.items(), found, strict=True):
-        progress(f"{spine}: certifying", 0.0)
+        if progress is not None:
+            progress(f"{spine}: certifying", 0.0)
         models = [design.animal(np.array(each.point)) for each in best]
         certified = [certify(model, reference.tolerance) for model in models]
         fronts[spine] = Front.of(spine, pair, certified)

@@ -50,7 +50,7 @@ def sweep(
     *,
     processes: int = 1,
     client: Any = None,
-    progress: Callable[[int, int], None] = lambda _done, _all: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Do all that a plan asks for and keep the rows in the directory ``out``.
 
@@ -63,7 +63,7 @@ def sweep(
     if not isinstance(plan, Plan | str | Path):
         raise InputError(f"{shortened(plan)} is no plan", "give one, or the path of a TOML file")
     plan = plan if isinstance(plan, Plan) else read_plan(plan)
-    begun = time.monotonic()
+    begun, tell = time.monotonic(), progress or (lambda _done, _whole: None)
     if not (Path(out) / MANIFEST).exists():
         check_task(plan)  # what was begun has been checked
     workers = min(check_count("processes", processes), plan.chunks)
@@ -72,11 +72,11 @@ def sweep(
         missing = [n for n in range(plan.chunks) if n not in store.finished]
         whole = plan.points * len(plan.models)
         done = whole - sum(plan.of_chunk(n)[2] for n in missing)
-        progress(done, whole)
+        tell(done, whole)
         for chunk, part in crew.map(do_chunk, ((n, (plan, n)) for n in missing)):
             store.add(chunk, part)
             done += plan.of_chunk(chunk)[2]
-            progress(done, whole)
+            tell(done, whole)
         found = store.finish()
     return Sweep(Path(out), plan, **found, made=len(missing), seconds=time.monotonic() - begun)
 
@@ -114,7 +114,7 @@ def rerun(
     *,
     processes: int = 1,
     client: Any = None,
-    progress: Callable[[int, int], None] = lambda _done, _all: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Rerun:
     """Repeat a sweep from its manifest and compare every chunk with what is there.
 
@@ -131,7 +131,8 @@ def rerun(
         for count, (chunk, part) in enumerate(crew.map(do_chunk, jobs), start=1):
             if part.digest != digest_of(store.file(chunk)):
                 differing[chunk] = store.file(chunk)
-            progress(count, len(chunks))
+            if progress is not None:
+                progress(count, len(chunks))
     before, now = manifest["made_with"], made_with()
     changed = {n: (before.get(n, ""), v) for n, v in now.items() if before.get(n) != v}
     lost = set(range(plan.chunks)) - set(chunks) if manifest.get("finished") else set()

@@ -136,7 +136,7 @@ def check_template(
     model: Model,
     levels: Sequence[Level] = LEVELS,
     *,
-    progress: Callable[[str], None] = lambda _name: None,
+    progress: Callable[[str], None] | None = None,
 ) -> TemplateCheck:
     """Compare one stride of a flexible bounder with MuJoCo's at every one of ``levels``.
 
@@ -153,14 +153,15 @@ def check_template(
             "these steps and shares of toes are not usable",
             f"give {ENOUGH} pairs or more, each smaller than the one before",
         )
-    progress("exact")
+    tell = progress or (lambda _what: None)
+    tell("exact")
     run = simulate(model)
     outcome = run.outcome
     if not outcome.completed:
         raise StateError(f"'{model.name}' makes no stride: {outcome.message}", outcome.advice)
     strides = []
     for level in levels:
-        progress(f"step {level.step * 1e3:.4g} ms, toes {level.share:.3g} of the body")
+        tell(f"step {level.step * 1e3:.4g} ms, toes {level.share:.3g} of the body")
         motion = MujocoBounder(model, *level).run(run.trajectory.duration)
         strides.append(TemplateStride(level, motion, _apart(run, motion)))
     return TemplateCheck(model, run, tuple(strides))

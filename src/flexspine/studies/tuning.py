@@ -123,7 +123,7 @@ def tune(
     seed: int = 0,
     processes: int = 1,
     store: Path | None = None,
-    progress: Progress = lambda _what, _share: None,
+    progress: Progress | None = None,
 ) -> Tuning:
     """Search for the numbers of a ``trot`` or ``bound`` at a speed (m/s); the same for one seed.
 
