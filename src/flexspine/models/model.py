@@ -116,6 +116,15 @@ class Model:
         """Return the same numbers under another name and origin."""
         return replace(self, name=name, source=source)
 
+    def record(self) -> dict[str, Any]:
+        """Return all that decides what it does on flat ground, as JSON holds it."""
+        return {
+            "model": self.kind.name,
+            "parameters": values(self.parameters),
+            "apex": dict(self.apex),
+            "touchdown": dict(self.touchdown),
+        }
+
     @cached_property
     def system(self) -> HybridSystem:
         """The hybrid system behind the model."""

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,7 +222,7 @@ def _basin(store: Store, number: int) -> Basin:
     kept = len(plan.axes) > len((first, second))
     ends = [f"apex_{name}" for name in model.apex]
     speeds = ["at_speed"] if kept else []
-    table = read_columns(store, number, ["outcome", "strides", *ends, *speeds])
+    table = store.columns(number, ["outcome", "strides", *ends, *speeds])
     # The speed is exactly zero only where there is none that keeps the energy.
     possible = table["at_speed"] != 0 if kept else np.ones(len(table["strides"]), dtype=bool)
     lasted = (table["outcome"] == "completed") & possible
@@ -261,20 +260,3 @@ def _others(gait: Gait, ends: Array) -> Iterator[Other]:
         found = examine(gait.model.with_values(apex=apex), tolerance=gait.tolerance)
         radius = None if found.flaw else floquet_multipliers(found).level_spectral_radius
         yield Other(apex, int(counts[which]), radius)
-
-
-def read_columns(store: Store, number: int, names: list[str]) -> dict[str, NDArray[Any]]:
-    """Columns of all rows of one of a sweep's models, in order. Raises `InputError`."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    each = store.plan.chunks_each
-    files = [store.file(chunk) for chunk in range(number * each, (number + 1) * each)]
-    try:
-        tables = [pq.ParquetFile(file).read(columns=names) for file in files]
-    except FileNotFoundError:
-        raise InputError(f"'{store.path}' is not finished", "finish the sweep first") from None
-    except pa.ArrowInvalid:
-        raise InputError(f"'{store.path}' is damaged", "begin it anew") from None
-    whole = pa.concat_tables(tables)
-    return {name: whole[name].to_numpy() for name in names}

@@ -16,10 +16,9 @@ from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.parameters import shortened
 from flexspine.studies.axes import GRID, Axis
-from flexspine.studies.basin import read_columns
 from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
-from flexspine.studies.tables import Row
+from flexspine.studies.tables import Row, known
 from flexspine.studies.task_kinds import GAITS
 
 STIFFNESS, SPEED = "spine.stiffness", "mean_speed"
@@ -81,8 +80,8 @@ class GaitMap:
         return [
             {
                 "spine_stiffness": float(stiffness),
-                "slowest": _known(slowest),
-                "fastest": _known(fastest),
+                "slowest": known(slowest),
+                "fastest": known(fastest),
                 "reason": reason,
             }
             for stiffness, slowest, fastest, reason in zip(*columns, strict=True)
@@ -94,8 +93,8 @@ class GaitMap:
             {
                 "spine_stiffness": float(stiffness),
                 "mean_speed": float(speed),
-                "peak_grf": _known(self.peak_grf[i, j]),
-                "level_spectral_radius": _known(self.radius[i, j]),
+                "peak_grf": known(self.peak_grf[i, j]),
+                "level_spectral_radius": known(self.radius[i, j]),
                 "stable": bool(self.radius[i, j] < 1) if np.isfinite(self.radius[i, j]) else None,
             }
             for i, stiffness in enumerate(self.stiffnesses)
@@ -147,7 +146,7 @@ def read_map(path: str | Path) -> GaitMap:
         raise InputError(f"'{folder}' holds no map", "give a directory of 'flexspine map'")
     peaks = [f"peak_grf_{side}" for side in SIDES]
     more = ["branch_from", "branch_to", "confirmed", "level_spectral_radius", "reason"]
-    table = read_columns(Store(folder, plan), 0, [*peaks, *more])
+    table = Store(folder, plan).columns(0, [*peaks, *more])
     stiffnesses, speeds = (axis.grid(0.0) for axis in plan.axes)
     shape = (len(stiffnesses), len(speeds))
     confirmed = np.array(table["confirmed"], dtype=float) == 1
@@ -167,7 +166,3 @@ def read_map(path: str | Path) -> GaitMap:
         fastest=np.where(high < speeds[-1] - room, high, np.nan),
         reasons=tuple(next((str(r) for r in line if r is not None), "") for line in why),
     )
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

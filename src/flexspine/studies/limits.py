@@ -201,18 +201,14 @@ def _gaits(
 
 
 def _examine_piece(piece: _Piece) -> Cell:
+    at = piece.stiffness, piece.speed, piece.design.name
+    if piece.gait is None:
+        return Cell(*at, None, None, {}, piece.reason)
     radius = None
     try:
-        if piece.gait is None:
-            raise FlexspineError(piece.reason or "", "")
         radius = floquet_multipliers(piece.gait).spectral_radius
         found = stabilize(piece.gait, piece.design.inputs, twice=piece.design.twice)
     except FlexspineError as failure:
-        return Cell(
-            piece.stiffness, piece.speed, piece.design.name, radius, None, {}, failure.message
-        )
+        return Cell(*at, radius, None, {}, failure.message)
     limits = {limit.name: largest(found, limit) for limit in piece.limits}
-    return Cell(
-        piece.stiffness, piece.speed, piece.design.name, radius, found.level_spectral_radius,
-        limits, None,
-    )  # fmt: skip
+    return Cell(*at, radius, found.level_spectral_radius, limits, None)

@@ -129,7 +129,9 @@ class Plan:
             "options": self.all_options,
             "axes": {axis.name: axis.record() for axis in self.axes},
             "models": [
-                model.record() if isinstance(model, Walker) else model_record(model)
+                model.record()
+                if isinstance(model, Walker)
+                else {"name": model.name, **model.record()}
                 for model in self.models
             ],
             "chunk": self.chunk_points,
@@ -166,17 +168,6 @@ class Plan:
         """A short name of all that decides the rows."""
         text = json.dumps(self.record(), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def model_record(model: Model) -> dict[str, Any]:
-    """A model's numbers, from which it can be made again."""
-    return {
-        "name": model.name,
-        "model": model.kind.name,
-        "parameters": values(model.parameters),
-        "apex": dict(model.apex),
-        "touchdown": dict(model.touchdown),
-    }
 
 
 def _revived(record: Mapping[str, Any]) -> Model | Walker:

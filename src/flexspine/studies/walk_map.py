@@ -12,10 +12,9 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.simulation import check_count
 from flexspine.parameters import is_number, shortened
 from flexspine.studies.axes import GRID, Axis
-from flexspine.studies.basin import read_columns
 from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
-from flexspine.studies.tables import Row
+from flexspine.studies.tables import Row, known
 from flexspine.studies.task_kinds import WALK_SECONDS, WALKS
 from flexspine.studies.walkers import Walker
 
@@ -100,7 +99,7 @@ class WalkMap:
                 "asked_speed": float(speed),
                 "spine_stiffness": float(stiffness) if body == "flexible" else None,
                 "fell": bool(self.fell[body][i, j]),
-                **{name: _known(table[name][i, j]) for name in MEASURES},
+                **{name: known(table[name][i, j]) for name in MEASURES},
             }
             for body, table in (("flexible", self.flexible), ("locked", self.locked))
             for i, speed in enumerate(self.speeds)
@@ -138,7 +137,7 @@ def read_walks(path: str | Path) -> WalkMap:
     shape = (len(speeds), len(stiffnesses))
     tables, fell = [], []
     for number in range(2):
-        columns = read_columns(Store(folder, plan), number, ["outcome", *MEASURES])
+        columns = Store(folder, plan).columns(number, ["outcome", *MEASURES])
         tables.append({name: columns[name].astype(float).reshape(shape) for name in MEASURES})
         fell.append((columns["outcome"] != "completed").reshape(shape))
     walker = plan.walkers[0]
@@ -152,7 +151,3 @@ def read_walks(path: str | Path) -> WalkMap:
         locked=tables[1],
         fell={"flexible": fell[0], "locked": fell[1]},
     )
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -19,7 +19,7 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model, check_between
 from flexspine.models.simulation import check_count
-from flexspine.studies.robustness import about, check_runs
+from flexspine.studies.robustness import check_runs, counting
 from flexspine.workers.lasting import do_all
 
 # Runs that are done, and kept, together.
@@ -178,7 +178,7 @@ def distance_to_fall(
     seed: int = 0,
     processes: int = 1,
     store: Path | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Wayfaring:
     """Run ``runs`` times over ground of seeds ``seed``, ``seed + 1``, ... for up to ``strides``.
 
@@ -204,11 +204,11 @@ def distance_to_fall(
         _run_piece,
         pieces,
         processes=check_count("processes", processes),
-        progress=lambda count, of: progress(runs * count // of, runs),
+        progress=counting(progress, runs),
         store=store,
         description={
             "kind": terrain.kind, "numbers": dict(terrain.numbers), "runs": runs,
-            "strides": strides, "seed": seed, "animal": {**about(model), **steering.settings},
+            "strides": strides, "seed": seed, "animal": {**model.record(), **steering.settings},
         },
         to_json=list,
         from_json=lambda rows: [Fate(*row) for row in rows],
