@@ -146,7 +146,7 @@ def terrain(
 
 def _passive(gait: Gait) -> Steering:
     from flexspine.control.steering import Fixed
-    from flexspine.gaits.problem import ANGLES
+    from flexspine.models.legs import ANGLES
 
     return Fixed(ANGLES, np.array([gait.model.numbers[name] for name in ANGLES]))
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from flexspine.control.steering import Steering
 from flexspine.errors import FlexspineError, ParameterError, UnknownNameError
 from flexspine.gaits.gait import Gait
-from flexspine.gaits.problem import ANGLES
 from flexspine.gaits.return_map import linearize, section_rows
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
@@ -25,6 +24,7 @@ from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.system import Section
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import STOOD
+from flexspine.models.legs import ANGLES
 from flexspine.models.model import Model, check_between
 
 METHODS = ("lqr", "deadbeat")

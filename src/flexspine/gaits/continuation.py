@@ -13,9 +13,9 @@ from flexspine.gaits.checkpoint import Checkpoint
 from flexspine.gaits.family import BranchPoint, Family
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.landmarks import Landmark, Segment
-from flexspine.gaits.problem import ANGLES, Problem
+from flexspine.gaits.problem import Problem
 from flexspine.gaits.tracing import CLOSED_BRANCH, LONGEST_STEP, Tracer, Tracing, land
-from flexspine.parameters import values
+from flexspine.models.legs import ANGLES
 
 MOST_POINTS = 2000
 
@@ -115,7 +115,7 @@ def trace_branch(
 
 def _description(family: Family, gait: Gait) -> dict[str, Any]:
     """All that decides what a branch looks like."""
-    problem, model = family.problem, gait.model
+    problem = family.problem
     return {
         "flexspine": __version__,
         "over": family.over,
@@ -124,10 +124,7 @@ def _description(family: Family, gait: Gait) -> dict[str, Any]:
         "symmetric": problem.symmetric,
         "strides": problem.strides,
         "tolerance": problem.tolerance,
-        "model": model.kind.name,
-        "parameters": values(model.parameters),
-        "apex": model.apex,
-        "touchdown": model.touchdown,
+        **gait.model.record(),
     }
 
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.newton import Attempt, Slice, solve
-from flexspine.gaits.problem import ANGLES, Problem
+from flexspine.gaits.problem import Problem
 from flexspine.gaits.return_map import ReturnMap, linearize, section_rows
 from flexspine.gaits.stability import Stability, floquet_multipliers
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
+from flexspine.models.legs import ANGLES
 
 # Iterations of a corrector; one that needs more has started too far away.
 CORRECTOR_ITERATIONS = 8

@@ -16,7 +16,7 @@ from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.lanes import compile_lanes
-from flexspine.models.legs import SIDES
+from flexspine.models.legs import ANGLES, SIDES
 from flexspine.models.model import LARGEST_START, TOLERANCES, Model, check_between
 from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count, simulate
 from flexspine.parameters import quantities, shortened, values
@@ -235,7 +235,7 @@ def _bounds(model: Model) -> dict[str, tuple[float, float, str]]:
     upright = np.nextafter(pi / 2, 0)
     angle = (-upright, upright, "give an angle from the vertical between -1.57 and 1.57 rad")
     bounds = dict.fromkeys(model.apex, any_number)
-    bounds |= {f"touchdown.{side}": angle for side in SIDES}
+    bounds |= dict.fromkeys(ANGLES, angle)
     for item in quantities(type(model.parameters)):
         low = np.nextafter(item.lower, np.inf) if item.lower_is_open else item.lower
         told = f"give a number in {item.told} ({item.meaning})"

@@ -18,7 +18,7 @@ from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.actuation import ACTUATORS, BARE, HIP_LEVER, Features
 from flexspine.models.bounder import FORE, HIND, BounderKind, beneath, works
 from flexspine.models.ground import Ground
-from flexspine.models.legs import SIDES, phase_of
+from flexspine.models.legs import ANGLES, SIDES, phase_of
 from flexspine.models.underfoot import OnGround, begin
 from flexspine.parameters import ParameterSet, is_number, quantities, replaced, shortened, values
 
@@ -166,7 +166,7 @@ class Model:
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Dotted names of ``system.parameters``, in order; the touchdown angles come last."""
-        return (*self.kind.body(BARE).parameters, *(f"touchdown.{side}" for side in SIDES))
+        return (*self.kind.body(BARE).parameters, *ANGLES)
 
     @cached_property
     def numbers(self) -> dict[str, float]:
@@ -214,7 +214,7 @@ class Model:
         scales["energy"] = self.mass * gravity * length
         for name in self.system.section.coordinates:
             scales.setdefault(name, rate if name.endswith("_rate") else 1.0)
-        scales |= {f"touchdown.{side}": 1.0 for side in SIDES}
+        scales |= dict.fromkeys(ANGLES, 1.0)
         return scales | {
             name: length if name.endswith((".extension", f".{HIP_LEVER}")) else 1.0
             for name in ACTUATORS

@@ -14,8 +14,8 @@ from flexspine.control.disturbance import Draw, disturbance, endure
 from flexspine.control.stabilize import Stabilizer, stabilize
 from flexspine.errors import FlexspineError, ParameterError
 from flexspine.gaits.gait import Gait, examine
-from flexspine.gaits.problem import ANGLES
 from flexspine.gaits.stability import floquet_multipliers
+from flexspine.models.legs import ANGLES
 from flexspine.models.model import Model, check_between
 from flexspine.models.simulation import check_count
 from flexspine.studies.following import Line, LostGaitError, carried
