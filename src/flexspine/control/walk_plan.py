@@ -58,7 +58,7 @@ class Pace:
 
 
 @dataclass(frozen=True)
-class Walk:
+class WalkPlan:
     """The plan of a walk for one robot."""
 
     robot: Robot

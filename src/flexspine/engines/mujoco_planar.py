@@ -15,7 +15,7 @@ from flexspine.mechanics.linkage import Array, Linkage
 from flexspine.mechanics.rerooting import rerooted
 
 
-class Motion(NamedTuple):
+class PinnedMotion(NamedTuple):
     """What an engine has found: absolute angles in rad (k, links) and the total energy in J (k,).
 
     The energy is kinetic, of weight with zero at the foot, and of springs.
@@ -40,7 +40,7 @@ class PinnedMujoco:
         # Where each of the tree's links stands among those of the linkage.
         self._order = [linkage.place[link.name] for link in self._tree.links]
 
-    def run(self, angles: Array, step: float, count: int, every: int) -> Motion:
+    def run(self, angles: Array, step: float, count: int, every: int) -> PinnedMotion:
         """Let go from rest at absolute ``angles`` (rad), by ``count`` Runge-Kutta steps (s).
 
         Returns the start and every ``every``-th step after it; NaN from where it diverged.
@@ -55,7 +55,7 @@ class PinnedMujoco:
                 if number % every == 0:
                     found.append(self._now())
         turns, energies = zip(*found, strict=True)
-        return Motion(np.array(turns), np.array(energies))
+        return PinnedMotion(np.array(turns), np.array(energies))
 
     def _relative(self, angles: Array) -> Array:
         """MuJoCo's joint angles."""

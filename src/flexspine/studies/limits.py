@@ -34,7 +34,7 @@ NOISY_STRIDES, UPSET_STRIDES = 1000, 50
 THRUST = "legs.extension"
 
 
-class Design(NamedTuple):
+class FeedbackDesign(NamedTuple):
     """A way to stabilise: what is steered, and whether at both flight apexes."""
 
     name: str
@@ -43,9 +43,9 @@ class Design(NamedTuple):
 
 
 DESIGNS = (
-    Design("angles, once", ANGLES, False),
-    Design("angles, twice", ANGLES, True),
-    Design("angles and thrust, twice", (*ANGLES, THRUST), True),
+    FeedbackDesign("angles, once", ANGLES, False),
+    FeedbackDesign("angles, twice", ANGLES, True),
+    FeedbackDesign("angles and thrust, twice", (*ANGLES, THRUST), True),
 )
 
 
@@ -122,7 +122,7 @@ class _Piece(NamedTuple):
     stiffness: float
     speed: float
     gait: Gait | None
-    design: Design
+    design: FeedbackDesign
     limits: tuple[Limit, ...]
     reason: str | None
 
@@ -132,7 +132,7 @@ def find_limits(
     stiffnesses: Sequence[float],
     speeds: Sequence[float],
     *,
-    designs: Sequence[Design] = DESIGNS,
+    designs: Sequence[FeedbackDesign] = DESIGNS,
     limits: Sequence[Limit] = LIMITS,
     processes: int = 1,
     store: Path | None = None,

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from flexspine.engines.mujoco_planar import Motion, PinnedMujoco
+from flexspine.engines.mujoco_planar import PinnedMotion, PinnedMujoco
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.models.pinned import Energies, PinnedRun, crouch, swing
@@ -46,7 +46,7 @@ class PinnedCase:
     run: PinnedRun
     times: Array
     steps: tuple[float, ...]
-    theirs: tuple[Motion, ...]
+    theirs: tuple[PinnedMotion, ...]
 
     @cached_property
     def angles(self) -> Array:

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexspine.engines.bounder_mjcf import check_bounder
-from flexspine.engines.mujoco_bounder import BounderMotion, Contact, MujocoBounder
+from flexspine.engines.mujoco_bounder import BounderMotion, LegEvent, MujocoBounder
 from flexspine.errors import ParameterError, StateError
 from flexspine.gaits.measures import summarize
 from flexspine.hybrid.compile import Array
@@ -106,8 +106,8 @@ class TemplateCheck:
         return Apart(*np.polyfit(np.log(shares), np.log(self.differences), 1)[0].tolist())
 
     @cached_property
-    def contacts(self) -> tuple[Contact, ...]:
-        """Our touchdowns and lift-offs."""
+    def contacts(self) -> tuple[LegEvent, ...]:
+        """Our touchdowns and lift-offs, with their times in s."""
         return _contacts(self.run)
 
     @cached_property
@@ -191,9 +191,9 @@ def _apart(run: Run, motion: BounderMotion) -> Apart:
     return Apart(place, angle, contact, peak)
 
 
-def _contacts(run: Run) -> tuple[Contact, ...]:
+def _contacts(run: Run) -> tuple[LegEvent, ...]:
     return tuple(
-        Contact(name, event.time)
+        LegEvent(name, event.time)
         for event in run.trajectory.events
         for name in event.names
         if name.endswith(("touchdown", "lift-off"))
