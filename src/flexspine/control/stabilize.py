@@ -201,7 +201,7 @@ def _parts(gait: Gait, inputs: tuple[str, ...], twice: bool) -> tuple[Part, ...]
         if not trajectory.outcome.completed:
             raise FlexspineError(
                 f"the gait has no apex between its stances ({trajectory.outcome})",
-                "act once a stride (--once)",
+                "act once a stride",
             )
         found = linearize(trajectory, symbols)
         at = section_rows(system)

@@ -16,8 +16,8 @@ from flexspine.gaits.starts import Sampler
 from flexspine.hybrid.compile import Array
 from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
-from flexspine.models.simulation import DEFAULT_TOLERANCE
-from flexspine.parameters import is_number, values
+from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
+from flexspine.parameters import check_seed, is_number, values
 
 # Natural units; gaits closer than this are one.
 DISTINCT = 1e-6
@@ -159,11 +159,8 @@ def _check_request(
             raise ParameterError(
                 f"'{name}' from {low:g} to {high:g} would vanish", "give a range above zero"
             )
-    for name, count, least in (("starts", starts, 1), ("seed", seed, 0)):
-        if not (isinstance(count, int) and count >= least):
-            raise ParameterError(
-                f"{name} = {count} is not usable", f"give a whole number from {least} on"
-            )
+    check_count("starts", starts)
+    check_seed(seed)
 
 
 def _counted(counts: Mapping[str, int]) -> str:

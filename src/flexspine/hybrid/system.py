@@ -137,7 +137,7 @@ class HybridSystem:
     reversal: Reversal | None = None
     tracked: tuple[str, ...] = ()
     large: bool = False
-    chatter_window: float = 1e-2  # no gait comes near it
+    chatter_window: float = 1e-2  # s; no gait comes near it
 
     @cached_property
     def places(self) -> dict[sp.Symbol, int]:

@@ -30,6 +30,9 @@ MOST_POINTS = 1_000_000
 # m, m/m; beyond these no height or slope means anything. What is steeper is a face.
 HIGHEST, STEEPEST_SLOPE = 1e3, 100.0
 
+# m; shorter or longer pieces and waves mean nothing either.
+SHORTEST, LONGEST = 1e-3, 1e6
+
 
 class Piece(NamedTuple):
     """Ground from ``start`` to ``end`` (m): a line of ``slope`` from height ``level`` (m) at the
@@ -74,7 +77,7 @@ class Ground:
         self._check_faces()
         _check("slope", self.before, -STEEPEST_SLOPE, STEEPEST_SLOPE)
         _check("slope", self.after, -STEEPEST_SLOPE, STEEPEST_SLOPE)
-        _check("wavelength", self.wavelength, 1e-3, 1e6)
+        _check("wavelength", self.wavelength, SHORTEST, LONGEST)
         steepest = STEEPEST_SLOPE / self.wave_number
         _check("amplitude", self.amplitude, -steepest, steepest)
 
@@ -164,7 +167,7 @@ class Ground:
     ) -> Ground:
         """``count`` steps by ``height`` m, each ``length`` m after the one before."""
         _check("height", height, -HIGHEST, HIGHEST)
-        _check("length", length, 1e-3, 1e6)
+        _check("length", length, SHORTEST, LONGEST)
         _check("count", count, 1, MOST_POINTS / 2)
         if count != int(count):
             raise ParameterError(f"count = {count:g} of steps is not usable", "give a whole number")
@@ -177,7 +180,7 @@ class Ground:
     def ramp(cls, height: float, length: float = 1.0, at: float = BEGINS) -> Ground:
         """Up by ``height`` m over ``length`` m, and level again."""
         _check("height", height, -HIGHEST, HIGHEST)
-        _check("length", length, 1e-3, 1e6)
+        _check("length", length, SHORTEST, LONGEST)
         return cls(f"ramp of {height:g} m over {length:g} m", ((at, 0.0), (at + length, height)))
 
     @classmethod
@@ -190,7 +193,7 @@ class Ground:
     def waves(cls, amplitude: float, wavelength: float = 1.0, at: float = BEGINS) -> Ground:
         """From x = ``at`` on a sinusoid."""
         _check("amplitude", amplitude, -HIGHEST, HIGHEST)
-        _check("wavelength", wavelength, 1e-3, 1e6)
+        _check("wavelength", wavelength, SHORTEST, LONGEST)
         name = f"waves of {amplitude:g} m, {wavelength:g} m long"
         return cls(name, ((at, 0.0),), amplitude=amplitude, wavelength=wavelength)
 
@@ -251,8 +254,8 @@ def _check(what: str, value: float, low: float, high: float) -> None:
 
 def _drawn(height: float, spacing: float, length: float, seed: int) -> list[float]:
     _check("height", height, 0, HIGHEST)
-    _check("spacing", spacing, 1e-3, 1e6)
-    _check("length", length, 0, 1e6)
+    _check("spacing", spacing, SHORTEST, LONGEST)
+    _check("length", length, 0, LONGEST)
     if spacing > length:
         raise ParameterError(
             f"spacing = {spacing:g} m is more than the ground is long, {length:.4g} m",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from numbers import Integral
 
 from flexspine.errors import ParameterError, StateError
 from flexspine.hybrid.bound import BoundSystem
@@ -18,7 +17,7 @@ from flexspine.models.actuation import BARE
 from flexspine.models.bounder import beneath
 from flexspine.models.model import Model, check_between
 from flexspine.models.underfoot import OnGround, clearances
-from flexspine.parameters import is_number, shortened
+from flexspine.parameters import check_whole, shortened
 
 # Taylor truncation error per step; strides then repeat to some 1e-13.
 DEFAULT_TOLERANCE = 1e-12
@@ -114,14 +113,13 @@ def simulate(
 
 
 def check_count(name: str, value: int) -> int:
-    """Return a whole number from 1 on. Raises `ParameterError` for anything else."""
-    if not (is_number(value) and isinstance(value, Integral) and value >= 1):
-        remedy = "give a whole number from 1 on"
-    elif value > MOST:
-        remedy = f"give no more than {MOST}"
-    else:
-        return int(value)
-    raise ParameterError(f"{name} = {shortened(value)} is not usable", remedy)
+    """Return a whole number from 1 to `MOST`. Raises `ParameterError` for anything else."""
+    count = check_whole(name, value, 1)
+    if count > MOST:
+        raise ParameterError(
+            f"{name} = {shortened(value)} is not usable", f"give no more than {MOST}"
+        )
+    return count
 
 
 def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:

@@ -20,7 +20,7 @@ from flexspine.gaits.gait_record import gait_record
 from flexspine.gaits.search import find_gaits
 from flexspine.models.actuation import ACTUATORS, SPINE_SHIFTS, STRIDE_PHASES
 from flexspine.models.simulation import check_count
-from flexspine.parameters import is_number
+from flexspine.parameters import check_seed, check_whole, is_number
 from flexspine.studies.design import Design, Ranges
 from flexspine.studies.following import SAME, STEP
 from flexspine.studies.frontier import Found, Frontier
@@ -185,9 +185,8 @@ def _check(minimise: Sequence[str], spines: Sequence[str], draws: int, seed: int
     for name in spines:
         if name not in SPINES:
             raise UnknownNameError("kind of spine", name, SPINES)
-    for what, count in (("draws", draws), ("seed", seed)):
-        if not (isinstance(count, int) and count >= 0):
-            raise ParameterError(f"{what} = {count} is not usable", "give a whole number from 0 on")
+    check_whole("draws", draws, 0)
+    check_seed(seed)
 
 
 def _search(frontiers: Sequence[Frontier], points: int, draws: int, seed: int) -> list[list[Found]]:
