@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
+from flexspine.errors import UnknownNameError
 from flexspine.mechanics.linkage import Array, Linkage
 from flexspine.mechanics.stance import passive_forces
 
@@ -190,6 +191,13 @@ def force_family(
 
     ``locked`` joints hold themselves. ``q``, ``rates`` and ``accelerations`` have shape (N,).
     """
+    known = [foot.name for foot in linkage.feet]
+    for foot in feet:
+        if foot not in known:
+            raise UnknownNameError("foot", foot, known)
+    for joint in locked:
+        if joint not in linkage.place:
+            raise UnknownNameError("joint", joint, [each.name for each in linkage.joints])
     motors = linkage.actuation.shape[1]
     holds = np.eye(linkage.size)[:, [linkage.place[name] for name in locked]]
     matrix = np.concatenate([linkage.actuation, linkage.foot_jacobian(q, feet).T, holds], axis=1)
