@@ -1,7 +1,7 @@
 """Frozen, validated parameters with unit, bounds and meaning, reached by dotted names.
 
 A model declares its parameters as nested `ParameterSet` classes whose fields are made by
-`quantity`. Everything else (the preset listing, `--set spine.stiffness=240`, provenance in a
+`quantity`. Everything else (the preset listing, ``--set spine.stiffness=240``, provenance in a
 result file) works from those declarations.
 """
 

@@ -70,7 +70,11 @@ class Gains(ParameterSet):
 
 @dataclass(frozen=True)
 class Walk:
-    """A way to walk: ``rhythm``, ``trot`` or ``bound``, with its numbers."""
+    """A way to walk in space, with its numbers.
+
+    ``rhythm`` is ``trot`` or ``bound``; ``gains`` are its numbers and those of the servos, by
+    dotted name such as ``gait.frequency``. ``source`` tells where they come from.
+    """
 
     name: str
     rhythm: str
@@ -78,14 +82,17 @@ class Walk:
     source: Source = field(default_factory=lambda: Source(title=""))
 
     def with_values(self, changes: Mapping[str, Any]) -> Walk:
-        """The same with some numbers changed, by dotted name.
+        """Return the same with some numbers changed, by dotted name, SI.
 
         Raises `UnknownNameError` and `ParameterError`.
         """
         return Walk(self.name, self.rhythm, replaced(self.gains, changes), self.source)
 
     def pattern(self, legs: Mapping[str, Leg]) -> Rhythm:
-        """Its rhythm on these legs. Raises `ParameterError` unless two are at each of two hips."""
+        """Return its rhythm on these legs, by name.
+
+        Raises `ParameterError` unless two are at each of two hips.
+        """
         gait = self.gains.gait
         hind, _ = hip_pairs(legs)
         return replace(
@@ -113,7 +120,8 @@ def walk_names(robot: str) -> list[str]:
 def load_walk(walk: str | Path, robot: str) -> Walk:
     """Load a walk of a robot by name, one of another by its full name, or from a TOML file.
 
-    Raises `UnknownNameError`, `PresetError` and `ParameterError`.
+    ``robot`` is the name of one; a full name is such as ``sc618-trot``. Raises `UnknownNameError`
+    and `PresetError`.
     """
     name = str(walk)
     if is_path(name):

@@ -66,10 +66,11 @@ class LegFunction:
 
 
 def standing(robot: Robot, height: float, ahead: Mapping[str, float]) -> Array:
-    """``q`` of a robot that stands still with its hips at ``height`` (m).
+    """Return the coordinates ``q`` of a robot that stands with its hips at ``height`` (m).
 
-    Feet are below their hips, or ``ahead`` of them by so many m, by leg. Raises `ParameterError`
-    for a robot without legs to stand on, and for feet that are out of reach.
+    Shape (N,), in the order of its linkage, SI. Feet are on level ground below their hips, or
+    ``ahead`` of them by so many m, by leg. Raises `ParameterError` for a robot without legs to
+    stand on, and for feet that are out of reach.
     """
     legs = legs_of(robot)
     for name, leg in legs.items():

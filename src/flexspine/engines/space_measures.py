@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class SpaceSummary:
-    """A run in space in numbers, in SI units.
+    """A run in space in numbers, in SI units and radians.
 
     All but ``distance``, ``deepest``, ``torque`` and ``imbalance`` are of the whole strides in the
     second half of the run, None or nothing if it did not come so far. ``speed`` is along the mean
@@ -69,7 +69,7 @@ class SpaceSummary:
 
 
 def summarize_space(run: SpaceRun) -> SpaceSummary:
-    """Measure a run in space."""
+    """Measure a run in space, over the whole strides in its second half."""
     samples = run.samples
     time, com = samples["time"], samples["com"]
     energy = samples["kinetic_energy"] + samples["potential_energy"]

@@ -41,9 +41,11 @@ TOLD = 0.1
 
 @dataclass(frozen=True)
 class SpaceRun:
-    """A run in space: what was asked for, how it ended, and samples of everything by name.
+    """A run in space; `space_dataset` gives every quantity of it over time.
 
-    ``samples`` are taken whenever torques are chosen; their shapes begin with the times.
+    ``space`` is the robot and ``walk`` what it was to do, ``settings`` what else was asked for.
+    ``laws`` tell by foot how it meets the ground. ``samples`` by name are taken whenever torques
+    are chosen; their shapes begin with the times. ``outcome`` tells how the run ended.
     """
 
     space: SpaceRobot
@@ -143,7 +145,7 @@ def run_in_space(
     step: float = STEP,
     progress: Callable[[float], None] | None = None,
 ) -> SpaceRun:
-    """Let a robot walk in MuJoCo, from standing.
+    """Let a robot walk in MuJoCo for some ``seconds``, from standing.
 
     ``sensing`` (rad) is how far angles of joints are read off at most, drawn evenly from ``seed``;
     ``step`` (s) is MuJoCo's, shortened to divide the time between two samples. ``plane`` keeps the

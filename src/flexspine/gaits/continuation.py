@@ -27,8 +27,8 @@ SAME = 1e-12
 class Branch:
     """A branch of gaits, followed in ``over`` from one end to the other.
 
-    ``points`` and ``landmarks`` are in order along it; ``ends`` say why it ends, or where it was
-    left.
+    ``points`` (each a `BranchPoint`) and ``landmarks`` are in order along it; the two ``ends`` say
+    why it ends, or where it was left. ``family`` are the equations that all its gaits solve.
     """
 
     over: str
@@ -81,13 +81,15 @@ def trace_branch(
     """Follow the branch of a gait in ``over`` both ways, until it ends or leaves ``bounds``.
 
     ``over`` is ``mean_speed``, ``energy``, an apex coordinate, ``touchdown.fore`` or ``.hind``, or
-    a parameter by its dotted name. ``fixed`` are the quantities kept, by default the gait's
-    energy, apex height and mean speed without ``over``, or, for another apex coordinate or a
-    touchdown angle, energy and height. ``free`` are further parameters that may change, such as an
-    actuator that makes good what dampers take. ``symmetric`` follows symmetric gaits only
-    (by default if the gait is one). ``store`` is a file that keeps every step; traced again with
-    the same arguments, the branch goes on from there. SI and radians. Raises `UnknownNameError`,
-    `ParameterError`, `OutputError`.
+    a parameter by its dotted name; ``bounds`` are its lowest and highest value. ``fixed`` are the
+    quantities kept, by default the gait's energy, apex height and mean speed without ``over``, or,
+    for another apex coordinate or a touchdown angle, energy and height. ``free`` are further
+    parameters that may change, such as an actuator that makes good what dampers take.
+    ``symmetric`` follows symmetric gaits only (by default if the gait is one). ``longest_step`` is
+    in natural units along the branch; each direction has ``most_points`` at the most. ``store`` is
+    a file that keeps every step; traced again with the same arguments, the branch goes on from
+    there. ``progress`` is told every point. SI and radians. By pseudo-arclength: Keller 1977.
+    Raises `UnknownNameError`, `ParameterError`, `OutputError`.
     """
     family = family_of(gait, over, fixed, symmetric, free)
     tracer = Tracer(family, bounds, longest_step, most_points)

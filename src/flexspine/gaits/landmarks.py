@@ -58,7 +58,7 @@ AT_APEX = 1e-6
 
 @dataclass(frozen=True)
 class Landmark:
-    """Something that happens on a branch.
+    """Something that happens on a `Branch`.
 
     ``kind`` is ``fold``, ``branch point``, ``symmetry breaking``, ``period doubling``,
     ``Neimark-Sacker``, ``multiplier +1``, ``contact order``, ``second touchdown``, ``grazing``,

@@ -41,11 +41,11 @@ OTHER = "look at the outcome of a run near these values"
 
 @dataclass(frozen=True)
 class Search:
-    """What a search has found: distinct gaits, and how each start fared.
+    """What a search has found: a sequence of distinct gaits, and how each start fared.
 
-    ``tally`` counts starts by ``found`` or the reason that there is nothing: ``fell``, ``no_apex``
-    and other outcomes, ``stalled``, ``left_bounds``, ``refuted``. ``dropped`` counts drawn points
-    by the outcome that made them no starts at all.
+    ``gaits`` are symmetric ones first. ``tally`` counts starts by ``found`` or the reason that
+    there is nothing: ``fell``, ``no_apex`` and other outcomes, ``stalled``, ``left_bounds``,
+    ``refuted``. ``dropped`` counts drawn points by the outcome that made them no starts at all.
     """
 
     gaits: tuple[Gait, ...]
@@ -92,9 +92,10 @@ def find_gaits(
     angles are unknown. Without it, energy, height and mean speed are those of the model's own
     gait. ``free`` are parameters that become unknown too, with the range to start in. A
     ``symmetric`` gait is its own mirror image in time; None looks for symmetric and general ones.
-    ``bounds`` narrow or widen where unknowns may lie. SI and radians. The same seed finds the same
-    gaits. Raises `UnknownNameError`, and `ParameterError` where the fixed quantities do not
-    single out isolated gaits.
+    ``starts`` of them are drawn for either kind. ``bounds`` narrow or widen where unknowns may lie,
+    low and high by name. SI and radians. The same seed finds the same gaits. ``progress`` is told
+    the share that is done, 0 to 1. Raises `UnknownNameError`, and `ParameterError` where the fixed
+    quantities do not single out isolated gaits.
     """
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
     ranges = {**(bounds or {}), **(free or {})}

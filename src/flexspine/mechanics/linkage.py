@@ -270,13 +270,13 @@ class Linkage:
         return found
 
     def kinetic_energy(self, q: Array, rates: Array) -> Array:
-        """In J, shape (...)."""
+        """Kinetic energy in J, shape (...)."""
         momentum = (self.mass_matrix(q) @ rates[..., None])[..., 0]
         energy: Array = (rates * momentum).sum(axis=-1) / 2
         return energy
 
     def potential_energy(self, q: Array) -> Array:
-        """Of weight, zero at height zero, and of springs, in J, shape (...)."""
+        """Energy of weight, zero at height zero, and of springs, in J, shape (...)."""
         energy: Array = self.mass * self.gravity * self.com(q)[..., 1]
         for joint in self.joints:
             bend = q[..., self.place[joint.name]] - joint.rest

@@ -155,10 +155,11 @@ def to_dataset(
 ) -> xr.Dataset:
     """Return the run as a Dataset over ``time`` (s), every ``interval`` seconds or at ``times``.
 
+    Variables tell their meaning and their unit; x forward, y up, pitch nose up positive.
     ``phase`` is one of DF, FS, HS, DS. Events stand along ``event`` with ``event_time`` and
-    ``event_kind``; ground that is not flat along ``ground``. Attributes carry units, parameters,
-    versions, tolerance and outcome. A run that ended at its first instant has one sample at most.
-    Raises `ParameterError`.
+    ``event_kind``; ground that is not flat along ``ground``. Attributes carry parameters, versions,
+    tolerance and outcome. A run that ended at its first instant has one sample at most. Raises
+    `ParameterError` for times that are not usable.
     """
     import xarray as xr
 

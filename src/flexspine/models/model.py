@@ -31,9 +31,10 @@ LARGEST_START = 1e6
 
 @dataclass(frozen=True)
 class Source:
-    """Where a model's numbers come from.
+    """Where the numbers of a model, a robot or a walk come from.
 
-    ``provenance`` tells it per dotted name where it differs from ``source``.
+    ``source`` tells it in short, ``citation`` in full; ``provenance`` tells it per dotted name
+    where it differs from ``source``. ``notes`` and ``doubts`` are sentences.
     """
 
     title: str
@@ -44,18 +45,20 @@ class Source:
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, name: str) -> str:
-        """Return where the value of ``name`` comes from."""
+        """Return where the value of a dotted name comes from."""
         return self.provenance.get(name, self.source)
 
 
 @dataclass(frozen=True)
 class Model:
-    """A bounder ready to run. All values in SI and radians.
+    """A bounder ready to run, as `load_model` makes it. All values in SI and radians.
 
-    ``apex`` is the start, by section coordinate; ``touchdown`` the angle of each leg from the
-    vertical at touchdown, foot ahead of the hip positive. ``kept`` are dampers and actuators
-    whose terms stay in the equations even where their numbers vanish. The apex height is above the
-    ``ground`` at x = 0, which is flat and at height 0 if none is given.
+    ``kind`` is what it is, with its equations; ``parameters`` are its numbers, in groups. ``apex``
+    is the start, by section coordinate; ``touchdown`` the angle of each leg (``fore``, ``hind``)
+    from the vertical at touchdown, foot ahead of the hip positive. ``source`` tells where numbers
+    come from. ``kept`` are dampers and actuators whose terms stay in the equations even where their
+    numbers vanish. The apex height is above the ``ground`` at x = 0, which is flat and at height 0
+    if none is given. Raises `UnknownNameError` and `ParameterError`.
     """
 
     name: str
@@ -96,7 +99,8 @@ class Model:
     ) -> Model:
         """Return the same model with some values changed, parameters by dotted name.
 
-        ``origin`` tells where they come from. Raises `UnknownNameError` and `ParameterError`.
+        ``apex`` is by section coordinate, ``touchdown`` by leg; what is not named stays. ``origin``
+        tells where they come from. Raises `UnknownNameError` and `ParameterError`.
         """
         changed = dict(parameters or {})
         names = [*changed, *(["apex"] if apex else []), *(["touchdown"] if touchdown else [])]
@@ -158,7 +162,7 @@ class Model:
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
-        """Public names of the states, in order."""
+        """Names of the states, in order, such as ``com_x`` and ``fore_pitch_rate``."""
         coordinates = ("com_x", "com_y", *self.kind.body(BARE).coordinates)
         rates = (f"{name}_rate" for name in coordinates)
         return (*coordinates, *rates, "dissipated_energy", *works(self.features))
@@ -194,7 +198,7 @@ class Model:
 
     @cached_property
     def mass(self) -> float:
-        """Of the whole body, in kg."""
+        """Mass of the whole body, in kg."""
         given = values(self.parameters)
         if "body.mass" in given:
             return given["body.mass"]
@@ -248,7 +252,7 @@ class Model:
         return OnGround(compiled, self.parameter_vector, self.ground)
 
     def apex_state(self) -> HybridState:
-        """The start in flight, at the apex."""
+        """Return the start in flight, at the apex."""
         name_of = dict(zip(self.system.states, self.state_names, strict=True))
         section = self.system.section.coordinates
         start = {name_of[symbol]: self.apex[c] for c, symbol in section.items()}
@@ -259,9 +263,10 @@ class Model:
     def state(
         self, start: Mapping[str, float], toes: Mapping[str, float] | None = None
     ) -> HybridState:
-        """Any state, by state name (absent ones are zero); ``toes`` (m) are those on the ground.
+        """Return any state, by state name; absent ones are zero.
 
-        Raises `UnknownNameError` and `ParameterError`.
+        ``toes`` are the places x in m of those on the ground, by leg. Raises `UnknownNameError` and
+        `ParameterError`.
         """
         toes = toes or {}
         _check_numbers("state", {**dict.fromkeys(self.state_names, 0.0), **start}, self.state_names)

@@ -33,9 +33,9 @@ def load_model(
 ) -> Model:
     """Load a preset by name, or a TOML file by path, with some values changed.
 
-    ``parameters`` by dotted name (``{"spine.stiffness": 240}``), ``apex`` by section coordinate,
-    ``touchdown`` by leg; SI and radians. Raises `UnknownNameError`, `PresetError`,
-    `ParameterError`.
+    ``parameters`` by dotted name (``{"spine.stiffness": 240}``), ``apex`` by section coordinate
+    such as ``height``, ``touchdown`` by leg (``fore``, ``hind``); SI and radians. Raises
+    `UnknownNameError`, `PresetError`, `ParameterError`.
     """
     model = _load(str(preset), ())
     return model.with_values(parameters, apex=apex, touchdown=touchdown)

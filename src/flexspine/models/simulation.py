@@ -28,7 +28,11 @@ MOST = 2**53
 
 @dataclass(frozen=True)
 class Run:
-    """A simulated run of a model: what was run, and what came of it."""
+    """A simulated run of a model; `to_dataset` gives every quantity of it over time.
+
+    ``trajectory`` has its arcs, events and crossings of the section; ``tolerance`` is the
+    integrator's.
+    """
 
     model: Model
     trajectory: Trajectory
@@ -46,7 +50,7 @@ class Run:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases in order: DF, FS, HS, DS."""
+        """The contact phases in order: DF (no leg stands), FS (fore), HS (hind), DS (both)."""
         return self.trajectory.modes
 
     @property
@@ -59,11 +63,11 @@ class Run:
 
     @property
     def apexes(self) -> list[dict[str, float]]:
-        """Section states by name, the start included if the run began at an apex."""
+        """The section coordinates of all apexes by name, SI; the start included if it is one."""
         return [self.section_state(point) for point in self.section_points]
 
     def section_state(self, point: HybridState) -> dict[str, float]:
-        """The section coordinates of a point, by name."""
+        """Return the section coordinates of a point, by name, SI."""
         system = self.model.system
         return {
             name: float(point.states[system.places[symbol]])
@@ -84,9 +88,10 @@ def simulate(
     """Simulate ``strides`` strides (default 1) or ``duration`` seconds.
 
     Starts at the model's apex, or at ``state`` by state name (absent ones zero) with the legs in
-    ``toes`` (toe position x in m) on the ground. ``tolerance`` is the integrator's, between 1e-17
-    and 1e-3; ``max_steps`` bounds the work of one stride. A run that falls or gets stuck is no
-    error: look at ``outcome``. Raises `ParameterError` and `StateError`.
+    ``toes`` (toe position x in m) on the ground; SI and radians. ``tolerance`` is the integrator's,
+    between 1e-17 and 1e-3; ``max_steps`` bounds the Taylor steps of one stride. A run that falls or
+    gets stuck is no error: look at ``outcome``. Raises `UnknownNameError`, `ParameterError`, and
+    `StateError` for a start in the ground or with a leg that would pull.
     """
     if strides is not None and duration is not None:
         raise ParameterError("both strides and duration are given", "give one of them")

@@ -33,12 +33,13 @@ AT_BOUND = 1e-9
 
 @dataclass(frozen=True)
 class GaitMap:
-    """Gaits over spine stiffness (N m/rad) and mean speed (m/s), at one energy and apex height.
+    """Gaits over spine stiffness and mean speed, at one ``energy`` (J) and apex ``height`` (m).
 
-    Shape (stiffnesses, speeds), NaN where there is no gait: ``peak_grf`` in N per pair of legs,
-    also NaN for a gait that could not be run as far as its peak; ``radius`` on the energy level.
-    ``slowest`` and ``fastest`` (stiffnesses,) are the speeds at which gaits end, NaN if they do
-    not within the map. ``reasons`` tells, by stiffness, why they end where they do.
+    ``stiffnesses`` (n,) are in N m/rad, ``speeds`` (m,) in m/s. Shape (n, m), NaN where there is no
+    gait: ``peak_grf`` in N per pair of legs, also NaN for a gait that could not be run as far as
+    its peak; ``radius``, the spectral radius on the energy level. ``slowest`` and ``fastest`` (n,)
+    are the speeds at which gaits end, NaN if they do not within the map. ``reasons`` tells, by
+    stiffness, why they end where they do. ``model`` starts on the gait that was followed.
     """
 
     model: Model
@@ -63,7 +64,10 @@ class GaitMap:
         return int((self.radius < 1).sum())
 
     def extremes(self, values: Array) -> Row | None:
-        """The least and the largest of one value a gait, and where they are."""
+        """Return the least and the largest of ``values`` (n, m), and where; None of no gaits.
+
+        ``values`` are such as ``radius`` or ``peak_grf``.
+        """
         if not np.isfinite(values).any():
             return None
         places = {"least": np.nanargmin(values), "largest": np.nanargmax(values)}
@@ -75,7 +79,7 @@ class GaitMap:
         return {name: float(v) for name, v in {"value": values[i, j], **where}.items()}
 
     def ends(self) -> list[Row]:
-        """By stiffness, the speeds at which gaits end, None where they reach beyond the map."""
+        """Return by stiffness the speeds at which gaits end, None where they reach beyond."""
         columns = (self.stiffnesses, self.slowest, self.fastest, self.reasons)
         return [
             {
@@ -88,7 +92,7 @@ class GaitMap:
         ]
 
     def rows(self) -> list[Row]:
-        """A row for every point of the map, None where there is no gait."""
+        """Return a row for every point of the map, None where there is no gait."""
         return [
             {
                 "spine_stiffness": float(stiffness),
@@ -112,8 +116,8 @@ def map_plan(
 ) -> Plan:
     """Plan to follow a gait over ``points`` mean speeds, for each of ``lines`` stiffnesses.
 
-    Both ranges are low and high, SI. Energy and apex height are the gait's. Raises
-    `ParameterError` and `UnknownNameError`.
+    Both ranges are low and high, SI. Energy and apex height are the gait's. `sweep` does the plan,
+    `read_map` reads what it found. Raises `InputError`.
     """
     if not isinstance(gait, Gait):
         raise ParameterError(f"{shortened(gait)} is no gait", "make one with examine(model)")
@@ -138,7 +142,11 @@ def map_plan(
 
 
 def read_map(path: str | Path) -> GaitMap:
-    """Read what a sweep of `map_plan` has found. Raises `InputError`."""
+    """Read what a sweep of `map_plan` has found.
+
+    ``path`` is the directory of the sweep. Raises `InputError` if it holds none, or an unfinished
+    one.
+    """
     folder = Path(path)
     plan = read_plan_of(folder)
     names = tuple(axis.name for axis in plan.axes)

@@ -138,10 +138,14 @@ def find_limits(
     store: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Cell]:
-    """Find the limits of the model's gait at every spine stiffness (N m/rad) and mean speed (m/s).
+    """Find what the model's gait survives at most, over spine stiffness and mean speed.
 
-    ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
-    share the work without a change to results. Raises `ParameterError` and `OutputError`.
+    ``stiffnesses`` are in N m/rad, ``speeds`` in m/s. At each of them the gait is stabilised by
+    every one of ``designs``, and the largest noise, push (N s) and step (m) of ``limits`` found by
+    doubling and bisection, to a tenth of itself. ``store`` is a file that keeps what is done; the
+    same call goes on from there. ``processes`` share the work without a change to results.
+    ``progress`` is told how many pieces are done, and of how many. Raises `ParameterError` and
+    `OutputError`.
     """
     _check(model, stiffnesses, speeds)
     pieces = [

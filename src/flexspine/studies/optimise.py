@@ -54,17 +54,19 @@ WIDE = 10.0
 
 
 class NoGaitError(FlexspineError):
-    """There is no gait of the kind that was asked for."""
+    """There is no gait of the kind that was asked for. Exit code 1."""
 
     code = "no_gait"
 
 
 @dataclass(frozen=True)
 class Optimisation:
-    """The fronts, by kind of spine.
+    """Pareto fronts of gaits, by kind of spine: ``constant`` stiffness and stiffness ``by phase``.
 
     ``reference`` is the given gait, carried to the speed. Of the two objectives in ``minimise``
-    the second one had limits. ``ranges`` are what was varied, by kind of spine.
+    the second one had limits. ``ranges`` are what was varied, low and high (SI) by name, by kind of
+    spine. The ``points`` of each of the ``fronts`` are gaits with their stability, in order of the
+    second objective.
     """
 
     reference: Gait
@@ -98,14 +100,17 @@ def optimise(
 ) -> Optimisation:
     """Find the gaits at a mean speed that are best in two objectives, with both kinds of spines.
 
-    Objectives are ``peak_grf``, ``cost_of_transport`` and ``spectral_radius``. ``ranges`` are low
-    and high (SI) of parameters, and of what else need not stay as it is in the gait: ``energy``,
-    ``height`` and other apex coordinates, touchdown angles. ``shift`` is how far the stiffness may
-    differ in other phases from that around the apex, relative. ``points`` are limits of the second
-    objective for which the least first one is looked for, ``draws`` random designs to start from
-    besides the given gait. ``store`` is a file that keeps every finished piece: the same call goes
-    on from it. The same seed finds the same fronts, whatever ``processes``. Raises `InputError`,
-    and `NoGaitError` where there is no gait to start from.
+    ``speed`` is in m/s, by default the gait's own. ``minimise`` names the objectives: two of
+    ``peak_grf``, ``cost_of_transport`` and ``spectral_radius``. ``ranges`` are low and high (SI) of
+    parameters, and of what else need not stay as it is in the gait: ``energy``, ``height`` and
+    other apex coordinates, touchdown angles. ``shift`` is how far the stiffness may differ in other
+    phases from that around the apex, relative. ``spines`` are the kinds to do. ``points`` are
+    limits of the second objective for which the least first one is looked for, ``draws`` random
+    designs to start from besides the given gait. ``store`` is a file that keeps every finished
+    piece: the same call goes on from it. The same seed finds the same fronts, whatever
+    ``processes``. ``progress`` is told what is done and which share of it, 0 to 1. By the epsilon
+    constraint method: Haimes, Lasdon, Wismer 1971. Raises `InputError`, and `NoGaitError` where
+    there is no gait to start from.
     """
     check_count("points", points)
     _check(minimise, spines, draws, seed)

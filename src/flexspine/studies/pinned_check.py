@@ -114,7 +114,10 @@ class PinnedCase:
 
 @dataclass(frozen=True)
 class PinnedCheck:
-    """A robot pinned by a foot: without dampers, and with those that it has, if any."""
+    """A robot pinned by a foot and let go, by our equations and by MuJoCo's.
+
+    ``cases`` are its motions, without dampers and with those that it has, if any.
+    """
 
     robot: Robot
     foot: str
@@ -122,7 +125,7 @@ class PinnedCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether every motion is MuJoCo's."""
+        """Whether every motion is MuJoCo's: close at its smallest step, and of its order."""
         return all(case.agrees for case in self.cases)
 
 
@@ -137,9 +140,9 @@ def check_pinned(
     """Let a passive robot go from a crouch, held by a foot: by our equations and by MuJoCo's.
 
     ``foot`` is the robot's first if none is given, ``seconds`` how long it swings, ``step`` the
-    largest of MuJoCo's steps in s, shortened to divide `COMPARED`; each of the others is half the
-    one before. ``progress`` is told what is done next.
-    Raises `MachineError` without a MuJoCo that will do, `UnknownNameError` for an unknown foot,
+    largest of MuJoCo's steps in s, shortened to divide the 0.5 s in which both have to agree; each
+    of the others is half the one before. ``progress`` is told what is done next. Raises
+    `MachineError` without a MuJoCo that will do, `UnknownNameError` for an unknown foot,
     `ParameterError` for times that are not usable and `StateError` if the motion cannot be
     integrated.
     """

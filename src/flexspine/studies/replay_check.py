@@ -110,7 +110,10 @@ class ReplayCase:
 
 @dataclass(frozen=True)
 class ReplayCheck:
-    """A trot of the planar robot and its replays, each on a ground closer to ours."""
+    """A trot of the planar robot, ``run``, and its replays, each on a ground closer to ours.
+
+    ``motion`` is what was replayed, a case of ``cases`` what came of it on one ground.
+    """
 
     run: RobotRun
     motion: PlanarMotion
@@ -138,8 +141,9 @@ def check_replay(
 ) -> ReplayCheck:
     """Let a planar robot trot by computed torque, and replay it in MuJoCo on every ground.
 
-    Raises `MachineError` without a MuJoCo that will do, and `ParameterError` for a robot that
-    cannot trot or is not described in space.
+    The trot lasts ``seconds`` (s); ``grounds`` come ever closer to rigid ground under feet that are
+    points. ``progress`` is told what is done next. Raises `MachineError` without a MuJoCo that will
+    do, and `ParameterError` for a robot that cannot trot or is not described in space.
     """
     mujoco_module()
     tell = progress or (lambda _what: None)

@@ -119,7 +119,11 @@ def wilson(survived: int, runs: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """What animals survive of one kind of disturbance up to ``largest``."""
+    """What animals survive of one kind of disturbance, of sizes up to ``largest``.
+
+    Each was to make ``strides`` strides; ``animals`` has by name what became of its runs, all of
+    which met the same disturbances, drawn from ``seed``.
+    """
 
     kind: Disturbance
     largest: float
@@ -129,12 +133,12 @@ class Robustness:
 
     @property
     def signs(self) -> dict[str, int]:
-        """The sides to which it may disturb."""
+        """The sides to which it may disturb, by name: 1, or -1 for negative sizes."""
         return {"positive": 1, "negative": -1} if self.kind.signed else {"positive": 1}
 
     @property
     def edges(self) -> Array:
-        """Of bins of size, shape (bins + 1,)."""
+        """The edges of the bins in which survival is counted by size, shape (bins + 1,)."""
         low = -self.largest if self.kind.signed else 0.0
         return np.linspace(low, self.largest, BINS * len(self.signs) + 1)
 
@@ -164,10 +168,12 @@ def survive(
 ) -> Robustness:
     """Disturb every animal ``runs`` times at random, each to make ``strides`` strides.
 
-    ``kind`` is push, step, rough, blocks, acting or sensing; sizes are drawn evenly up to
+    ``animals`` are gaits under feedback, by name. ``kind`` is ``push`` (N s), ``step``, ``rough``,
+    ``blocks`` (m), ``acting`` or ``sensing`` (noise, relative); sizes are drawn evenly up to
     ``largest``, to both sides where there are two. ``store`` is a file that keeps what is done;
     the same call goes on from there. ``processes`` share the work without a change to results.
-    ``progress`` is told runs. Raises `UnknownNameError`, `ParameterError` and `OutputError`.
+    ``progress`` is told how many runs are done, and of how many. Raises `UnknownNameError`,
+    `ParameterError` and `OutputError`.
     """
     what = disturbance(kind)
     largest = what.largest if largest is None else largest

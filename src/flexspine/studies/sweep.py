@@ -24,8 +24,9 @@ from flexspine.workers.local import LocalWorkers
 class Sweep:
     """A finished sweep: where it is, and what its rows amount to.
 
-    ``outcomes`` counts rows, ``strides`` those completed; ``digest`` is of all rows;
-    ``made`` tells how many of its chunks were made just now, in ``seconds``.
+    ``path`` is its directory. ``outcomes`` counts ``rows`` by outcome, ``strides`` is the number of
+    those completed; ``digest`` is of all rows; ``made`` tells how many of its chunks were made just
+    now, in ``seconds``.
     """
 
     path: Path
@@ -54,11 +55,11 @@ def sweep(
 ) -> Sweep:
     """Do all that a plan asks for and keep the rows in the directory ``out``.
 
-    ``plan`` is one or the TOML file of one. Interrupted or killed, the same call goes on with the
-    same directory. ``processes`` are local; ``client`` is a Dask client, or a scheduler's address
-    such as ``tcp://host:8786``, in their place. ``progress`` is told how many points are done, and
-    of how many. Raises `InputError`, `MachineError` where workers fail, and `OSError` where the
-    disk does.
+    ``plan`` is a `Plan` or the path of its TOML file. Interrupted or killed, the same call goes on
+    with the same directory. ``processes`` are local; ``client`` is a Dask client, or a scheduler's
+    address such as ``tcp://host:8786``, in their place. ``progress`` is told how many points are
+    done, and of how many. Raises `InputError`, `MachineError` where workers fail, and `OSError`
+    where the disk does.
     """
     if not isinstance(plan, Plan | str | Path):
         raise InputError(f"{shortened(plan)} is no plan", "give one, or the path of a TOML file")
@@ -92,10 +93,11 @@ def crew_of(processes: int, client: Any) -> Crew:
 
 @dataclass(frozen=True)
 class Rerun:
-    """Whether a sweep came out the same: ``differing`` are chunks that did not, with their files,
-    ``missing`` those of a finished sweep that are no longer there.
+    """Whether a sweep came out the same a second time.
 
-    ``changed`` tells, by name, what it was made with and what that is now, where they differ.
+    ``chunks`` were compared, ``differing`` are those that came out otherwise, with their files,
+    ``missing`` those of a finished sweep that are no longer there. ``changed`` tells, by name, what
+    it was made with and what that is now, where they differ.
     """
 
     chunks: int
@@ -118,7 +120,8 @@ def rerun(
 ) -> Rerun:
     """Repeat a sweep from its manifest and compare every chunk with what is there.
 
-    Nothing is written. An unfinished sweep is repeated as far as it got. Raises as `sweep`.
+    ``path`` is its directory. Nothing is written. An unfinished sweep is repeated as far as it got.
+    ``progress`` is told how many chunks are done, and of how many. Raises as `sweep`.
     """
     manifest, plan = read_manifest(Path(path)), read_plan_of(Path(path))
     store = Store(Path(path), plan)

@@ -83,7 +83,10 @@ class TemplateStride:
 
 @dataclass(frozen=True)
 class TemplateCheck:
-    """One stride of ours, ``run``, and MuJoCo's ``strides`` at every level, the finest last."""
+    """One stride of a flexible bounder, ``model``, by our equations and by MuJoCo's.
+
+    ``run`` is ours, ``strides`` are MuJoCo's at every level, the finest last.
+    """
 
     model: Model
     run: Run
@@ -91,7 +94,11 @@ class TemplateCheck:
 
     @cached_property
     def differences(self) -> Array:
-        """What `Apart` tells, of all levels, shape (levels, 4)."""
+        """How far both are apart at most, at all levels, shape (levels, 4).
+
+        In the place of the CoM (m), the angle of a segment (rad), the time of a touchdown or
+        lift-off (s) and the peak force of a leg, as a share of the larger one of ours.
+        """
         return np.array([each.apart for each in self.strides])
 
     @cached_property
@@ -112,7 +119,7 @@ class TemplateCheck:
 
     @cached_property
     def peaks(self) -> Array:
-        """Our peak forces of the legs, in N, in the order of `SIDES`."""
+        """Our peak forces of the fore and the hind leg, in N, shape (2,)."""
         return _peaks(self.run)
 
     @property
@@ -140,10 +147,11 @@ def check_template(
 ) -> TemplateCheck:
     """Compare one stride of a flexible bounder with MuJoCo's at every one of ``levels``.
 
-    The stride starts at the model's apex, which ought to be that of a gait. ``progress`` is told
-    what is done next. Raises `MachineError` without a MuJoCo that will do, `ParameterError` for
-    other models, actuators and levels that are not usable, and `StateError` if the model makes no
-    stride.
+    The stride starts at the model's apex, which ought to be that of a gait. A level is a time step
+    (s) and the mass of a toe as a share of the body's; both shrink from one to the next.
+    ``progress`` is told what is done next. Raises `MachineError` without a MuJoCo that will do,
+    `ParameterError` for other models, actuators and levels that are not usable, and `StateError` if
+    the model makes no stride.
     """
     check_bounder(model)
     levels = tuple(Level(*level) for level in levels)

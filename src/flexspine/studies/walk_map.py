@@ -50,8 +50,9 @@ def walk_plan(
 ) -> Plan:
     """Plan to let a robot walk at every stiffness (N m/rad) and asked speed (m/s).
 
-    The locked one walks as often at every speed, each time with another noise on its sensors.
-    Raises `ParameterError`.
+    The locked one walks as often at every speed, each time with another noise on its sensors, drawn
+    from ``seed``. Walks last ``seconds`` (s); without ``speeds`` they are shares of the walk's own,
+    0.6 to 1.6. `sweep` does the plan, `read_walks` reads what it found. Raises `ParameterError`.
     """
     if not isinstance(walker, Walker):
         raise ParameterError(
@@ -76,10 +77,12 @@ def walk_plan(
 
 @dataclass(frozen=True)
 class WalkMap:
-    """Walks over asked speeds (m/s) and stiffnesses (N m/rad), each (n,) and (m,).
+    """Walks in space of one robot, ``name``, over asked speeds and stiffnesses of its spine.
 
-    ``flexible`` and ``locked`` have by measure an array (n, m), NaN where the walk ended early;
-    those of the locked spine are as many repeats. ``fell`` counts early ends, by body, (n, m).
+    ``speeds`` (n,) are in m/s, ``stiffnesses`` (m,) in N m/rad. ``flexible`` and ``locked`` have by
+    measure an array (n, m), SI, NaN where the walk ended early; those of the locked spine are as
+    many repeats. ``fell`` tells which walks ended early, by body, (n, m). Walks have a ``rhythm``
+    and were to last ``seconds`` (s).
     """
 
     name: str
@@ -92,7 +95,7 @@ class WalkMap:
     fell: dict[str, Array]
 
     def rows(self) -> list[Row]:
-        """A row for every walk, None where there is no value."""
+        """Return a row for every walk, None where there is no value; SI."""
         return [
             {
                 "body": body,
@@ -107,7 +110,10 @@ class WalkMap:
         ]
 
     def compared(self, measure: str) -> list[Row]:
-        """By speed: the mean of the locked spine, and the best stiffness with its value."""
+        """Return by speed the mean of the locked spine, and the best stiffness with its value.
+
+        ``measure`` is such as ``peak_normal``; least is best, of ``speed`` most.
+        """
         better = np.nanargmax if measure == "speed" else np.nanargmin
         found: list[Row] = []
         for i, speed in enumerate(self.speeds):
@@ -125,7 +131,11 @@ class WalkMap:
 
 
 def read_walks(path: str | Path) -> WalkMap:
-    """Read what a sweep of `walk_plan` has found. Raises `InputError`."""
+    """Read what a sweep of `walk_plan` has found.
+
+    ``path`` is the directory of the sweep. Raises `InputError` if it holds none, or an unfinished
+    one.
+    """
     folder = Path(path)
     plan = read_plan_of(folder)
     names = tuple(axis.name for axis in plan.axes)
