@@ -34,10 +34,10 @@ from benchmarks.scipy_peer import (
     STIFFNESS,
     WHOLE,
     Event,
-    _hip,
-    _terminal,
+    hip_place,
     scalar_field,
     stride,
+    terminal,
 )
 
 ENERGY, HEIGHT = 290.0, 0.32
@@ -95,7 +95,7 @@ def apex_state(pitch: float, rate: float) -> Any:
 
 def _until(field: Any, z: Any, event: Event) -> tuple[float, Any]:
     done = solve_ivp(
-        field, (0.0, 1.0), z, "DOP853", rtol=TOLERANCE, atol=TOLERANCE, events=_terminal(event)
+        field, (0.0, 1.0), z, "DOP853", rtol=TOLERANCE, atol=TOLERANCE, events=terminal(event)
     )
     if done.status != 1:
         raise ValueError("a phase of the half stride does not end")
@@ -109,15 +109,15 @@ def _during(field: Any, z: Any, span: float, tolerance: float) -> Any:
 def half_stride(start: Any, angle: float) -> Half:
     """Fall, fore stance and rise to the next apex."""
     landing = LENGTH * cos(angle)
-    fall, z = _until(FLIGHT, start, lambda _t, z: _hip("fore", z)[1] - landing)
-    toe = _hip("fore", z)[0] + LENGTH * sin(angle)
+    fall, z = _until(FLIGHT, start, lambda _t, z: hip_place("fore", z)[1] - landing)
+    toe = hip_place("fore", z)[0] + LENGTH * sin(angle)
 
     def shortened(_t: float, z: Any) -> float:
-        x, y = _hip("fore", z)
+        x, y = hip_place("fore", z)
         return LENGTH - sqrt((x - toe) ** 2 + y * y)
 
     stance, z = _until(scalar_field({"fore": toe}), z, shortened)
-    x, y = _hip("fore", z)
+    x, y = hip_place("fore", z)
     rise = z[5] / GRAVITY
     if rise <= 0.0:
         raise ValueError("no apex after the fore stance")
@@ -220,13 +220,13 @@ def half_tangent(half: Half, angle: float) -> Tangent:
     later = -(up @ columns[:4] + LENGTH * sin(angle) * by_angle) / (up @ z[4:])
     toe = across @ columns[:4] + across @ z[4:] * later + LENGTH * cos(angle) * by_angle
     columns[0] -= toe
-    reach = _hip("fore", z)[0] + LENGTH * sin(angle)
+    reach = hip_place("fore", z)[0] + LENGTH * sin(angle)
     z[0] -= reach
     both = np.concatenate((z, columns.ravel()))
     both = _during(_stance_tangent, both, half.stance, TANGENT_TOLERANCE)
     z, columns = both[:8], both[8:].reshape(8, 7)
     across, up = _hip_slopes(z)
-    u, v = _hip("fore", z)
+    u, v = hip_place("fore", z)
     along, aside = (u * across + v * up) / LENGTH, (v * across - u * up) / LENGTH**2
     later = -(along @ columns[:4]) / (along @ z[4:])
     liftoff = aside @ columns[:4] + aside @ z[4:] * later

@@ -91,12 +91,12 @@ def numpy_field(toes: Toes) -> Callable[[float, Any], Any]:
     return field
 
 
-def _hip(side: str, z: Any) -> tuple[float, float]:
+def hip_place(side: str, z: Any) -> tuple[float, float]:
     a, b = (FAR, NEAR) if side == "fore" else (-NEAR, -FAR)
     return z[0] + a * cos(z[2]) + b * cos(z[3]), z[1] + a * sin(z[2]) + b * sin(z[3])
 
 
-def _terminal(event: Event) -> Event:
+def terminal(event: Event) -> Event:
     event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
     return event
 
@@ -105,12 +105,12 @@ def _leg_event(side: str, toes: Toes, angle: float) -> Event:
     if side in toes:
 
         def liftoff(_t: float, z: Any) -> float:
-            x, y = _hip(side, z)
+            x, y = hip_place(side, z)
             return LENGTH - sqrt((x - toes[side]) ** 2 + y * y)
 
-        return _terminal(liftoff)
+        return terminal(liftoff)
     landing = LENGTH * cos(angle)
-    return _terminal(lambda _t, z: _hip(side, z)[1] - landing)
+    return terminal(lambda _t, z: hip_place(side, z)[1] - landing)
 
 
 def stride(
@@ -128,7 +128,7 @@ def stride(
     while True:
         events = [_leg_event(side, dict(toes), angles[side]) for side in sides]
         if not toes and len(landed) == 2:
-            events.append(_terminal(lambda _t, z: z[5]))
+            events.append(terminal(lambda _t, z: z[5]))
         done = solve_ivp(
             field(dict(toes)), (t, 10.0), z, method, rtol=tolerance, atol=tolerance, events=events
         )
@@ -140,5 +140,5 @@ def stride(
         if side in toes:
             del toes[side]
         else:
-            toes[side] = _hip(side, z)[0] + LENGTH * sin(angles[side])
+            toes[side] = hip_place(side, z)[0] + LENGTH * sin(angles[side])
             landed.add(side)

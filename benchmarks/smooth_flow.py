@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import hand_field
-from flexspine.hybrid.compile import BoundSystem
+from flexspine.hybrid.bound import BoundSystem
 from flexspine.hybrid.trajectory import Trajectory
 
 Array = NDArray[np.float64]

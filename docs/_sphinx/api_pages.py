@@ -12,6 +12,7 @@ LAYERS = {
     "control": ("Control", "Feedback, walks, oscillators and how forces are shared."),
     "engines": ("In space", "The robot in MuJoCo."),
     "studies": ("Studies", "Sweeps, maps, disturbances, searches and checks."),
+    "hybrid": ("Outcomes", "How runs end, with advice."),
     "report": ("Figures and pages", "What draws results; nothing here simulates."),
     "errors": ("Errors", "All that is raised on purpose."),
 }

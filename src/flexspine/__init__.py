@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from flexspine._version import __version__
 
 if TYPE_CHECKING:
-    from flexspine.control.cpg import Cpg, rhythm
-    from flexspine.control.distribution import Aim, ForceFamily, force_family
+    from flexspine.control.cpg import Cpg, Rhythm, rhythm
+    from flexspine.control.distribution import Aim, Distribution, ForceFamily, force_family
     from flexspine.control.gains import Walk, load_walk, walk_names
     from flexspine.control.leg_function import standing
     from flexspine.control.spine_comparison import SpineComparison, compare_spines
@@ -23,20 +23,31 @@ if TYPE_CHECKING:
     from flexspine.engines.space_dataset import space_dataset
     from flexspine.engines.space_measures import SpaceSummary, summarize_space
     from flexspine.engines.space_run import SpaceRun, run_in_space
-    from flexspine.errors import FlexspineError, InputError, MachineError
+    from flexspine.errors import (
+        FlexspineError,
+        InputError,
+        MachineError,
+        OutputError,
+        ParameterError,
+        PresetError,
+        StateError,
+        UnknownNameError,
+    )
     from flexspine.gaits.continuation import Branch, trace_branch
+    from flexspine.gaits.family import BranchPoint
     from flexspine.gaits.files import load_gait, save_gait
     from flexspine.gaits.gait import Gait, examine
     from flexspine.gaits.landmarks import Landmark
-    from flexspine.gaits.measures import summarize
+    from flexspine.gaits.measures import Summary, summarize
     from flexspine.gaits.return_map import ReturnMap, stride_map
     from flexspine.gaits.search import Search, find_gaits
     from flexspine.gaits.stability import Stability, floquet_multipliers
     from flexspine.gaits.switching import switch_branch
+    from flexspine.hybrid.outcome import Outcome
     from flexspine.models.dataset import to_dataset
     from flexspine.models.ground import Ground
     from flexspine.models.many import Ensemble, simulate_many, stream_many
-    from flexspine.models.model import Model
+    from flexspine.models.model import Model, Source
     from flexspine.models.presets import load_model, preset_names
     from flexspine.models.robot import Robot
     from flexspine.models.robot_file import load_robot, robot_names
@@ -54,28 +65,32 @@ if TYPE_CHECKING:
     from flexspine.report.robot_figure import plot_robot
     from flexspine.report.robustness_figure import plot_robustness
     from flexspine.report.walks_figure import plot_walks
+    from flexspine.studies.axes import Axis
     from flexspine.studies.basin import Basin, basin_plan, read_basins
     from flexspine.studies.front_record import front_record
     from flexspine.studies.gait_map import GaitMap, map_plan, read_map
     from flexspine.studies.limits import find_limits
-    from flexspine.studies.optimise import Optimisation, optimise
+    from flexspine.studies.optimise import NoGaitError, Optimisation, optimise
     from flexspine.studies.pinned_check import PinnedCheck, check_pinned
     from flexspine.studies.plan import Plan
     from flexspine.studies.plan_file import read_plan
-    from flexspine.studies.replay_check import check_replay
-    from flexspine.studies.robustness import survive
+    from flexspine.studies.replay_check import ReplayCheck, check_replay
+    from flexspine.studies.robustness import Robustness, survive
     from flexspine.studies.sweep import Rerun, Sweep, rerun, sweep
-    from flexspine.studies.template_check import check_template
-    from flexspine.studies.tuning import Tuning, tune
+    from flexspine.studies.template_check import TemplateCheck, check_template
+    from flexspine.studies.tuning import NoWalkError, Tuning, tune
     from flexspine.studies.walk_map import WalkMap, read_walks, walk_plan
     from flexspine.studies.walkers import Walker
-    from flexspine.studies.wayfaring import Terrain, distance_to_fall
+    from flexspine.studies.wayfaring import Terrain, Wayfaring, distance_to_fall
 
 _HOMES = {
     "Aim": "control.distribution",
+    "Axis": "studies.axes",
     "Basin": "studies.basin",
     "Branch": "gaits.continuation",
+    "BranchPoint": "gaits.family",
     "Cpg": "control.cpg",
+    "Distribution": "control.distribution",
     "Ensemble": "models.many",
     "FlexspineError": "errors",
     "ForceFamily": "control.distribution",
@@ -86,32 +101,47 @@ _HOMES = {
     "Landmark": "gaits.landmarks",
     "MachineError": "errors",
     "Model": "models.model",
+    "NoGaitError": "studies.optimise",
+    "NoWalkError": "studies.tuning",
     "Noise": "control.steering",
     "Optimisation": "studies.optimise",
+    "Outcome": "hybrid.outcome",
+    "OutputError": "errors",
     "Pace": "control.walk_plan",
+    "ParameterError": "errors",
     "PinnedCheck": "studies.pinned_check",
     "Plan": "studies.plan",
+    "PresetError": "errors",
+    "ReplayCheck": "studies.replay_check",
     "Rerun": "studies.sweep",
     "ReturnMap": "gaits.return_map",
+    "Rhythm": "control.cpg",
     "Robot": "models.robot",
     "RobotRun": "models.robot_run",
+    "Robustness": "studies.robustness",
     "Run": "models.simulation",
     "Search": "gaits.search",
+    "Source": "models.model",
     "SpaceRun": "engines.space_run",
     "SpaceSummary": "engines.space_measures",
     "SpineComparison": "control.spine_comparison",
     "Stability": "gaits.stability",
     "Stabilizer": "control.stabilize",
+    "StateError": "errors",
     "SteeredRun": "control.steering",
     "Steering": "control.steering",
+    "Summary": "gaits.measures",
     "Sweep": "studies.sweep",
+    "TemplateCheck": "studies.template_check",
     "Terrain": "studies.wayfaring",
     "Trot": "control.trot",
     "Tuning": "studies.tuning",
+    "UnknownNameError": "errors",
     "Walk": "control.gains",
     "WalkMap": "studies.walk_map",
     "WalkSummary": "control.walk_measures",
     "Walker": "studies.walkers",
+    "Wayfaring": "studies.wayfaring",
     "animate": "report.animation",
     "basin_plan": "studies.basin",
     "check_pinned": "studies.pinned_check",
@@ -178,9 +208,12 @@ _HOMES = {
 
 __all__ = [
     "Aim",
+    "Axis",
     "Basin",
     "Branch",
+    "BranchPoint",
     "Cpg",
+    "Distribution",
     "Ensemble",
     "FlexspineError",
     "ForceFamily",
@@ -191,32 +224,47 @@ __all__ = [
     "Landmark",
     "MachineError",
     "Model",
+    "NoGaitError",
+    "NoWalkError",
     "Noise",
     "Optimisation",
+    "Outcome",
+    "OutputError",
     "Pace",
+    "ParameterError",
     "PinnedCheck",
     "Plan",
+    "PresetError",
+    "ReplayCheck",
     "Rerun",
     "ReturnMap",
+    "Rhythm",
     "Robot",
     "RobotRun",
+    "Robustness",
     "Run",
     "Search",
+    "Source",
     "SpaceRun",
     "SpaceSummary",
     "SpineComparison",
     "Stability",
     "Stabilizer",
+    "StateError",
     "SteeredRun",
     "Steering",
+    "Summary",
     "Sweep",
+    "TemplateCheck",
     "Terrain",
     "Trot",
     "Tuning",
+    "UnknownNameError",
     "Walk",
     "WalkMap",
     "WalkSummary",
     "Walker",
+    "Wayfaring",
     "__version__",
     "animate",
     "basin_plan",

@@ -4,12 +4,15 @@
     ├── InputError              what the caller gave cannot be used        exit code 2
     │   ├── UnknownNameError    no such preset, parameter, model, option
     │   ├── ParameterError      a value of the wrong type or out of bounds
-    │   ├── PresetError         a preset file that cannot be read
+    │   ├── PresetError         a preset, robot, walk or gait that cannot be read
     │   ├── StateError          an initial state that cannot be simulated
     │   └── OutputError         a place that results cannot be written to
-    └── MachineError      the machine failed, such as a full disk   exit code 3
+    ├── MachineError            the machine failed, such as a full disk    exit code 3
+    ├── NoGaitError             nothing to optimise (`flexspine.studies.optimise`)
+    └── NoWalkError             no walk lasts (`flexspine.studies.tuning`)
 
-A run that merely ends badly (it fell) raises nothing: that is an `Outcome`.
+All but the first two kinds end the command line with exit code 1. A run that merely ends badly
+(it fell) raises nothing: that is an `Outcome`.
 """
 
 from __future__ import annotations
@@ -24,7 +27,11 @@ OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
 class FlexspineError(Exception):
-    """An error with what went wrong and what to do about it, in one line each."""
+    """An error with what went wrong and what to do about it, in one line each.
+
+    ``message`` and ``remedy`` are these lines; ``code`` is a short name of its kind, and
+    ``exit_code`` what the command line ends with. The base of all errors that flexspine raises.
+    """
 
     code: ClassVar[str] = "error"
     exit_code: ClassVar[int] = 1
@@ -49,14 +56,14 @@ def _again(kind: type[FlexspineError], message: str, remedy: str) -> FlexspineEr
 
 
 class InputError(FlexspineError):
-    """The caller's input cannot be used."""
+    """The caller's input cannot be used; the base of all errors about it. Exit code 2."""
 
     code = "bad_input"
     exit_code = 2
 
 
 class UnknownNameError(InputError):
-    """A name that is not in a known list."""
+    """A name that is not in a known list; the remedy is the nearest one, or all of them."""
 
     code = "unknown_name"
 
@@ -74,7 +81,7 @@ class ParameterError(InputError):
 
 
 class PresetError(InputError):
-    """A preset file that is missing or malformed."""
+    """A file of a preset, robot, walk or gait that is missing or malformed."""
 
     code = "bad_preset"
 
@@ -92,7 +99,7 @@ class OutputError(InputError):
 
 
 class MachineError(FlexspineError):
-    """The machine failed, such as a full disk."""
+    """The machine failed: a full disk, workers that died, a missing library. Exit code 3."""
 
     code = "environment"
     exit_code = 3

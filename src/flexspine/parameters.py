@@ -1,7 +1,7 @@
 """Frozen, validated parameters with unit, bounds and meaning, reached by dotted names.
 
 A model declares its parameters as nested `ParameterSet` classes whose fields are made by
-`quantity`. Everything else (the preset listing, `--set spine.stiffness=240`, provenance in a
+`quantity`. Everything else (the preset listing, ``--set spine.stiffness=240``, provenance in a
 result file) works from those declarations.
 """
 
@@ -172,6 +172,20 @@ def shortened(value: Any, most: int = 40) -> str:
     return shown if len(shown) <= most else f"{shown[:most]}..."
 
 
+def check_whole(name: str, value: Any, least: int) -> int:
+    """Return a whole number from ``least`` on. Raises `ParameterError` for anything else."""
+    if not (isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= least):
+        raise ParameterError(
+            f"{name} = {shortened(value)} is not usable", f"give a whole number from {least} on"
+        )
+    return int(value)
+
+
+def check_seed(seed: Any) -> int:
+    """Return a seed as a whole number. Raises `ParameterError` for anything but one from 0 on."""
+    return check_whole("seed", seed, 0)
+
+
 def _quantity(name: str, field: FieldInfo) -> Quantity:
     bounds: dict[str, Any] = {}
     for rule in field.metadata:
@@ -202,12 +216,3 @@ def _explained(failure: ValidationError, declared: Mapping[str, Quantity]) -> Pa
         f"parameter '{name}' = {shortened(fault['input'])} is not usable",
         f"give a number in {about.told} ({about.meaning})",
     )
-
-
-def check_seed(seed: Any) -> int:
-    """Return a seed as a whole number. Raises `ParameterError` for anything but one from 0 on."""
-    if not (isinstance(seed, Integral) and not isinstance(seed, bool) and int(seed) >= 0):
-        raise ParameterError(
-            f"seed = {shortened(seed)} is not usable", "give a whole number from 0 on"
-        )
-    return int(seed)

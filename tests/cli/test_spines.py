@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from flexspine.studies import replay_check
-from flexspine.studies.replay_check import Ground
+from flexspine.studies.replay_check import SoftGround
 from tests.cli.conftest import Cli
 from tests.cli.test_gait import assert_one_clear_line
 
@@ -71,7 +71,7 @@ def test_bad_input_is_one_clear_line_and_nothing_is_written(
 def test_engines_agree_and_say_where_not(
     cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    few = (Ground(0.035, 5e4, 1e3, 2.5e-4), Ground(0.001, 5e5, 3e3, 1e-4))
+    few = (SoftGround(0.035, 5e4, 1e3, 2.5e-4), SoftGround(0.001, 5e5, 3e3, 1e-4))
     monkeypatch.setattr(replay_check.check_replay, "__kwdefaults__",
                         {**replay_check.check_replay.__kwdefaults__, "grounds": few})  # fmt: skip
     done = cli("verify", "engines", "--seconds", "1", "--out", "here", "--json")

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from flexspine import Model, load_model
 from flexspine.hybrid.batch import Ends, Starts
-from flexspine.hybrid.compile import BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import compile_system
 from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.integrate import SECTION_TIMEOUT, integrate

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from flexspine.hybrid.compile import BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import compile_system
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode, Section

@@ -12,7 +12,8 @@ import pytest
 import sympy as sp
 
 from flexspine.gaits.return_map import ReturnMap, linearize
-from flexspine.hybrid.compile import BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import compile_system
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Guard, HybridSystem, Mode, Section

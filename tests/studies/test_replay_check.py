@@ -11,10 +11,10 @@ import pytest
 from flexspine import load_robot
 from flexspine.engines.replay import replay
 from flexspine.models.space import SpaceRobot
-from flexspine.studies.replay_check import Ground, ReplayCheck, check_replay
+from flexspine.studies.replay_check import ReplayCheck, SoftGround, check_replay
 
 # As the check has them, but for the stiffest, which takes long.
-GROUNDS = (Ground(0.035, 5e4, 1e3, 2.5e-4), Ground(0.001, 5e5, 3e3, 1e-4))
+GROUNDS = (SoftGround(0.035, 5e4, 1e3, 2.5e-4), SoftGround(0.001, 5e5, 3e3, 1e-4))
 
 
 @cache

@@ -17,7 +17,7 @@ from flexspine.control.stabilize import ANGLES, Stabilizer, stabilize
 from flexspine.control.steering import Fixed
 from flexspine.errors import InputError, OutputError, ParameterError, UnknownNameError
 from flexspine.studies import limits as limits_module
-from flexspine.studies.limits import LIMITS, PRECISION, Design, Limit, find_limits, largest
+from flexspine.studies.limits import LIMITS, PRECISION, FeedbackDesign, Limit, find_limits, largest
 from flexspine.studies.robustness import Endurance, survive, wilson
 from flexspine.studies.wayfaring import Terrain, Wayfaring, distance_to_fall, walk_over
 
@@ -181,8 +181,8 @@ def test_limits_over_stiffness_and_speed(tmp_path: Path) -> None:
     """The step down at the limit is survived, one above is not; where no gait is, it is told."""
     limit = Limit("push_forward", "push", 1, 10, ((0.0, 0),))
     designs = [
-        Design("thrust", THRUST, True),
-        Design("nothing", ("spine.stiffness_shift.both",), False),
+        FeedbackDesign("thrust", THRUST, True),
+        FeedbackDesign("nothing", ("spine.stiffness_shift.both",), False),
     ]
     seen: list[int] = []
     cells = find_limits(

@@ -157,7 +157,7 @@ def _passive(gait: Gait) -> Steering:
     import numpy as np
 
     from flexspine.control.steering import Fixed
-    from flexspine.gaits.problem import ANGLES
+    from flexspine.models.legs import ANGLES
 
     return Fixed(ANGLES, np.array([gait.model.numbers[name] for name in ANGLES]))
 

@@ -1,1 +1,1 @@
-"""Control of articulated robots."""
+"""Feedback for bounders, and drives of articulated robots."""

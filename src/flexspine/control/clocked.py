@@ -10,7 +10,8 @@ import numpy as np
 import sympy as sp
 
 from flexspine.control.joint_speed import speed_guard
-from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState

@@ -16,7 +16,7 @@ import sympy as sp
 from flexspine.control.joint_speed import speed_guard
 from flexspine.control.laws import Tracking
 from flexspine.control.references import References
-from flexspine.control.walking import Walker
+from flexspine.control.walking import WalkingDrive
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import OutcomeKind
 from flexspine.hybrid.system import Guard
@@ -40,7 +40,7 @@ SINGULAR = OutcomeKind(
 
 
 @dataclass(frozen=True)
-class ComputedTorque(Walker):
+class ComputedTorque(WalkingDrive):
     """Walk with joints that follow their references without delay."""
 
     law: Tracking = field(default_factory=Tracking)

@@ -27,11 +27,12 @@ from flexspine.models.model import check_between
 class Rhythm:
     """How legs take turns, in SI units.
 
-    ``offsets`` by leg are the shares of a cycle by which it is behind, ``duty`` the share of its
-    cycle that a leg stands. A foot goes ``stride`` back under its hip, at ``height`` below it, and
-    is lifted by ``clearance``. ``coupling`` (1/s) is how fast phases get into step, ``readiness``
-    (1/s) how fast the amplitude follows. The rhythm stops at ``stop`` (s). ``ahead`` by leg is how
-    far ahead of its hip the middle of a foot's way is, if it is not below it.
+    ``offsets`` by leg are the shares of a cycle by which it is behind, ``frequency`` (Hz) is that
+    of cycles, ``duty`` the share of its cycle that a leg stands. A foot goes ``stride`` (m) back
+    under its hip, at ``height`` (m) below it, and is lifted by ``clearance`` (m). ``coupling``
+    (1/s) is how fast phases get into step, ``readiness`` (1/s) how fast the amplitude follows. The
+    rhythm stops at ``stop`` (s). ``ahead`` (m) by leg is how far ahead of its hip the middle of a
+    foot's way is, if it is not below it. Raises `ParameterError` for numbers that no rhythm has.
     """
 
     offsets: Mapping[str, float]
@@ -62,10 +63,11 @@ RHYTHMS = ("trot", "bound")
 
 
 def rhythm(name: str, legs: Mapping[str, Leg], lag: float = 0.5) -> Rhythm:
-    """The rhythm of a gait: ``trot`` (diagonal pairs) or ``bound`` (fore pair against hind pair).
+    """Return the rhythm of a gait: ``trot`` (diagonal pairs) or ``bound`` (hind, then fore pair).
 
-    ``lag`` is the share of a cycle by which the second pair is behind the first.
-    Raises `UnknownNameError`, and `ParameterError` unless two legs are at each of two hips.
+    ``legs`` are those of a robot by name, ``lag`` is the share of a cycle by which the second pair
+    is behind the first. Raises `UnknownNameError`, and `ParameterError` unless two legs are at each
+    of two hips.
     """
     if name not in RHYTHMS:
         raise UnknownNameError("rhythm", name, RHYTHMS)
@@ -76,7 +78,7 @@ def rhythm(name: str, legs: Mapping[str, Leg], lag: float = 0.5) -> Rhythm:
 
 @dataclass(frozen=True)
 class Beat:
-    """Where a rhythm is: phases in rad by leg (n,), amplitude and its rate."""
+    """Where a rhythm is: phases in rad by leg (n,), amplitude (0 to 1) and its rate (1/s)."""
 
     phases: Array
     amplitude: float
@@ -85,7 +87,10 @@ class Beat:
 
 @dataclass(frozen=True)
 class Cpg:
-    """The oscillators of a rhythm."""
+    """A central pattern generator: the coupled oscillators of a rhythm, one for each leg.
+
+    Arrays over legs (n,) are in the order of the rhythm's ``offsets``.
+    """
 
     rhythm: Rhythm
 
@@ -94,17 +99,17 @@ class Cpg:
         return 2 * pi * np.array(list(self.rhythm.offsets.values()))
 
     def begin(self, phases: Array | None = None) -> Beat:
-        """At rest; in step, if no phases (rad, by leg) are given."""
+        """Return a beat at rest with these phases (n,) in rad; in step, if none are given."""
         return Beat(-self._lags if phases is None else np.asarray(phases, dtype=float), 0.0, 0.0)
 
     def rates(self, phases: Array) -> Array:
-        """How fast phases advance, in rad/s."""
+        """Return how fast phases (n,) in rad advance, in rad/s, shape (n,)."""
         lead = phases + self._lags  # equal for all legs in step
         pull = np.sin(lead[None, :] - lead[:, None]).sum(axis=1)
         return np.asarray(2 * pi * self.rhythm.frequency + self.rhythm.coupling * pull, dtype=float)
 
     def advance(self, beat: Beat, time: float, step: float) -> Beat:
-        """Go on from ``time`` by ``step``, both in s."""
+        """Return the beat ``step`` s after one at ``time`` (s), by a Runge-Kutta step."""
         one = self.rates(beat.phases)
         two = self.rates(beat.phases + one * step / 2)
         three = self.rates(beat.phases + two * step / 2)
@@ -121,11 +126,14 @@ class Cpg:
         )
 
     def in_stance(self, beat: Beat) -> Array:
-        """Which legs are in the part of their cycle in which they stand, shape (n,)."""
+        """Return which legs are in the part of their cycle in which they stand, shape (n,)."""
         return np.asarray((beat.phases / (2 * pi)) % 1 < self.rhythm.duty)
 
     def feet(self, beat: Beat) -> tuple[Array, Array]:
-        """Where feet are from their hips, and their velocity, shape (n, 2), x forward, y up."""
+        """Return where feet are from their hips (m) and their velocities (m/s), each (n, 2).
+
+        x forward, y up.
+        """
         cycle, duty = self.rhythm, self.rhythm.duty
         share = (beat.phases / (2 * pi)) % 1
         speed = self.rates(beat.phases) / (2 * pi)  # cycles a second
@@ -154,5 +162,5 @@ class Cpg:
         return place, velocity
 
     def with_stop(self, time: float) -> Cpg:
-        """The same, stopping at a time (s)."""
+        """Return the same, stopping at a time (s)."""
         return Cpg(replace(self.rhythm, stop=time))

@@ -66,7 +66,7 @@ class CpgDriven(Clocked):
     def joints(self, beat: Beat) -> tuple[Array, Array]:
         """Angles of the motors' joints and their rates at a beat, shape (m,)."""
         place, velocity = self.pattern.feet(beat)
-        return self._function.joints(place + self._hips, velocity)
+        return self._function.joints(place + self._function.hips, velocity)
 
     def begin(self, bound: BoundRobot) -> HybridState | Outcome:
         """The robot at rest on all its feet, which are below the hips."""
@@ -74,13 +74,8 @@ class CpgDriven(Clocked):
         numbers = [*beat.phases.tolist(), 0.0, 0.0]
         held = dict.fromkeys(self.held(), 0.0) | dict(zip(self._beat_symbols, numbers, strict=True))
         place, _ = self.pattern.feet(beat)
-        q = self._function.posture(place + self._hips)
+        q = self._function.posture(place + self._function.hips)
         return bound.begin(q, np.zeros_like(q), held)
-
-    @cached_property
-    def _hips(self) -> Array:
-        """Where hips are, shape (legs, 2)."""
-        return np.array([[leg.hip, 0.0] for leg in self.legs.values()])
 
     def _beat(self, held: Mapping[sp.Symbol, float]) -> Beat:
         *phases, amplitude, rate = (held[symbol] for symbol in self._beat_symbols)

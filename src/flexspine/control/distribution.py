@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
+from flexspine.errors import UnknownNameError
 from flexspine.mechanics.linkage import Array, Linkage
 from flexspine.mechanics.stance import passive_forces
 
@@ -30,7 +31,7 @@ INEQUALITY = 0
 
 
 class Aim(Enum):
-    """What to ask of a distribution."""
+    """What to ask of the distribution of a load; see `ForceFamily.choose`."""
 
     SPLIT = "split"
     """Normal forces closest to a wanted split; equal ones if none is given."""
@@ -43,7 +44,7 @@ class Aim(Enum):
 
 
 class Verdict(Enum):
-    """How many torques there are for what is wanted."""
+    """How many distributions there are for what is wanted."""
 
     UNIQUE = "unique"
     FAMILY = "family"
@@ -53,9 +54,11 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Distribution:
-    """Torques (m,) in N m and forces on k feet (k, 2) in N; None where there are none.
+    """One way to share a load between the feet.
 
-    ``margin`` is how many newtons the foot that is closest to slipping is away from it.
+    ``torques`` (m,) of the motors in N m and ``forces`` on k feet (k, 2) in N, x forward and y up;
+    None where ``verdict`` tells that there are none. ``dimension`` counts the numbers that were
+    free. ``margin`` is how many newtons the foot that is closest to slipping is away from it.
     """
 
     verdict: Verdict
@@ -69,8 +72,9 @@ class Distribution:
 class ForceFamily:
     """All torques and foot forces ``first + directions a`` that bring about a motion.
 
-    Rows are the torques (m) and then the forces on the feet (2 k). ``exists`` is False where
-    nothing does.
+    ``first`` has shape (m + 2 k,) and ``directions`` (m + 2 k, d): the torques of the m motors in
+    N m, and then the forces on the k feet in N, x and y of each in turn. ``motors`` is m.
+    ``exists`` is False where nothing brings the motion about.
     """
 
     motors: int
@@ -86,7 +90,12 @@ class ForceFamily:
     def choose(
         self, aim: Aim, friction: float, split: Sequence[float] | None = None
     ) -> Distribution:
-        """Take the best member. ``split`` are the feet's shares of the load, which sum to 1."""
+        """Return the best member in which no foot pulls or slips, if there is one.
+
+        ``friction`` is the coefficient of Coulomb friction. ``split`` (k,) are the feet's shares of
+        the load for `Aim.SPLIT`, which sum to 1; None: equal ones. Of several members that press
+        alike the one with least torque is taken.
+        """
         if not self.exists:
             return Distribution(Verdict.NONE, 0)
         if not self.dimension:
@@ -98,9 +107,10 @@ class ForceFamily:
         return self._made(Verdict.FAMILY, friction, best)
 
     def normal_range(self, foot: int, friction: float) -> tuple[float, float] | None:
-        """Within what torques can shift the normal force on a foot, by its place in the list.
+        """Return the least and the largest normal force in N that torques can put on a foot.
 
-        In N, while no foot pulls or slips; None if that is not to be had.
+        ``foot`` is its place in the list of feet, ``friction`` the coefficient of Coulomb friction.
+        While no foot pulls or slips; None if that is not to be had.
         """
         slopes, offsets = self._cones(friction)
         row = self.motors + 2 * foot + 1
@@ -188,8 +198,18 @@ def force_family(
 ) -> ForceFamily:
     """Find all torques and foot forces that keep a robot at rest, or bring about a motion.
 
-    ``locked`` joints hold themselves. ``q``, ``rates`` and ``accelerations`` have shape (N,).
+    ``linkage`` is that of a `Robot`, ``feet`` names those that stand. ``q``, ``rates`` and
+    ``accelerations`` have shape (N,), in the order of the linkage, SI; without the latter two the
+    robot is at rest. ``locked`` joints hold themselves. Raises `UnknownNameError` for a foot or a
+    joint that is not there.
     """
+    known = [foot.name for foot in linkage.feet]
+    for foot in feet:
+        if foot not in known:
+            raise UnknownNameError("foot", foot, known)
+    for joint in locked:
+        if joint not in linkage.place:
+            raise UnknownNameError("joint", joint, [each.name for each in linkage.joints])
     motors = linkage.actuation.shape[1]
     holds = np.eye(linkage.size)[:, [linkage.place[name] for name in locked]]
     matrix = np.concatenate([linkage.actuation, linkage.foot_jacobian(q, feet).T, holds], axis=1)

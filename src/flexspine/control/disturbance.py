@@ -16,6 +16,12 @@ from flexspine.hybrid.outcome import COMPLETED
 from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model
 
+# m; between the points of rough ground.
+SPACING = 0.3
+
+# Ground is so much longer than the undisturbed way, for those that get faster.
+LONGER = 1.5
+
 
 class Draw(NamedTuple):
     """How large a disturbance is, where in a stride it begins (0 to 1), and a seed."""
@@ -85,9 +91,6 @@ def _acting(gait: Gait, drawn: Draw, _strides: int) -> Upset:
 def _sensing(gait: Gait, drawn: Draw, _strides: int) -> Upset:
     return Upset(gait.model, Noise(sensing=drawn.size))
 
-
-# m; of rough ground. It is so much longer than the undisturbed way, for those that get faster.
-SPACING, LONGER = 0.3, 1.5
 
 # The one side of what has no other.
 EITHER = ("of any kind",)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,10 @@ from flexspine.control.leg_pairs import hip_pairs
 from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.leg_geometry import Leg
 from flexspine.models.model import Source
+from flexspine.models.toml_files import is_path, read_file, read_shipped, shipped_names
 from flexspine.parameters import ParameterSet, build, flattened, quantity, replaced
+
+FOLDER = "walks"
 
 ENTRIES = ("rhythm", "title", "source", "notes", "gait", "servo")
 
@@ -70,7 +70,11 @@ class Gains(ParameterSet):
 
 @dataclass(frozen=True)
 class Walk:
-    """A way to walk: ``rhythm``, ``trot`` or ``bound``, with its numbers."""
+    """A way to walk in space, with its numbers.
+
+    ``rhythm`` is ``trot`` or ``bound``; ``gains`` are its numbers and those of the servos, by
+    dotted name such as ``gait.frequency``. ``source`` tells where they come from.
+    """
 
     name: str
     rhythm: str
@@ -78,7 +82,7 @@ class Walk:
     source: Source = field(default_factory=lambda: Source(title=""))
 
     def with_values(self, changes: Mapping[str, Any]) -> Walk:
-        """The same with some numbers changed, by dotted name.
+        """Return the same with some numbers changed, by dotted name, SI.
 
         Raises `UnknownNameError` and `ParameterError`.
         """
@@ -87,7 +91,10 @@ class Walk:
         return Walk(self.name, self.rhythm, replaced(self.gains, changes), source)
 
     def pattern(self, legs: Mapping[str, Leg]) -> Rhythm:
-        """Its rhythm on these legs. Raises `ParameterError` unless two are at each of two hips."""
+        """Return its rhythm on these legs, by name.
+
+        Raises `ParameterError` unless two are at each of two hips.
+        """
         gait = self.gains.gait
         hind, _ = hip_pairs(legs)
         return replace(
@@ -104,57 +111,48 @@ class Walk:
 
 
 def walk_names(robot: str) -> list[str]:
-    """The names of the walks of a robot that come with flexspine, such as ``trot``."""
-    return sorted(
-        entry.name.removeprefix(f"{robot}-").removesuffix(".toml")
-        for entry in (files("flexspine") / "walks").iterdir()
-        if entry.name.startswith(f"{robot}-") and entry.name.endswith(".toml")
-    )
+    """Return the names of the walks of a robot that come with flexspine, such as ``trot``.
+
+    ``robot`` is the name of one.
+    """
+    own = f"{robot}-"
+    return [name.removeprefix(own) for name in shipped_names(FOLDER) if name.startswith(own)]
 
 
 def load_walk(walk: str | Path, robot: str) -> Walk:
     """Load a walk of a robot by name, one of another by its full name, or from a TOML file.
 
-    Raises `UnknownNameError`, `PresetError` and `ParameterError`.
+    ``robot`` is the name of one; a full name is such as ``sc618-trot``. Raises `UnknownNameError`
+    and `PresetError`.
     """
-    name, path = str(walk), Path(walk)
-    if path.suffix == ".toml" or path.is_file():
-        try:
-            text = path.read_text(encoding="utf-8-sig")
-        except (OSError, ValueError) as failure:
-            why = failure.strerror if isinstance(failure, OSError) else "is not text"
-            raise PresetError(f"'{name}' cannot be read ({why})", "give a TOML file") from None
-        name = path.stem
+    name = str(walk)
+    if is_path(name) and name not in (*walk_names(robot), *shipped_names(FOLDER)):
+        content, name = read_file(name), Path(name).stem
     else:
-        text = _shipped(name, robot).read_text(encoding="utf-8")
+        content = read_shipped(_full_name(name, robot), FOLDER)
     try:
-        return _walk(name, text)
+        return _walk(name, content)
     except InputError as failure:
         raise PresetError(f"gait '{walk}': {failure.message}", failure.remedy) from None
 
 
-def _shipped(name: str, robot: str) -> Traversable:
-    """The file of a walk that comes along: of this robot, or by its full name of any."""
-    place = files("flexspine") / "walks"
-    for each in (f"{robot}-{name}.toml", f"{name}.toml"):
-        if (place / each).is_file():
-            return place / each
-    known = walk_names(robot)
+def _full_name(name: str, robot: str) -> str:
+    """What a walk that comes along is called: one of this robot, or of any by its full name."""
+    shipped, known = shipped_names(FOLDER), walk_names(robot)
+    if name in known:
+        return f"{robot}-{name}"
+    if name in shipped:
+        return name
     if known:
         raise UnknownNameError("gait", name, known)
-    others = sorted(each.name.removesuffix(".toml") for each in place.iterdir())
     raise PresetError(
         f"robot '{robot}' has no gait '{name}' of its own",
-        f"give that of another robot ({', '.join(others)}) or a TOML file, such as "
+        f"give that of another robot ({', '.join(shipped)}) or a TOML file, such as "
         "'flexspine tune --out' writes",
     )
 
 
-def _walk(name: str, text: str) -> Walk:
-    try:
-        content = tomllib.loads(text)
-    except (ValueError, RecursionError) as failure:
-        raise InputError(f"not valid TOML: {failure}", "mend that line") from None
+def _walk(name: str, content: Mapping[str, Any]) -> Walk:
     for entry in content:
         if entry not in ENTRIES:
             raise UnknownNameError("entry", entry, ENTRIES)

@@ -8,7 +8,7 @@ import sympy as sp
 
 from flexspine.control.joint_speed import speed_guard
 from flexspine.control.laws import JointSprings
-from flexspine.control.walking import Walker
+from flexspine.control.walking import WalkingDrive
 from flexspine.hybrid.compile import Array
 from flexspine.mechanics.linkage_motion import LinkageMotion
 from flexspine.models.bound_robot import BoundRobot
@@ -18,7 +18,7 @@ STIFFNESS, DAMPING = sp.symbols("joint_stiffness joint_damping", real=True)
 
 
 @dataclass(frozen=True)
-class SpringDriven(Walker):
+class SpringDriven(WalkingDrive):
     """Walk on joints that give way; the spine bends as forces make it."""
 
     law: JointSprings = field(default_factory=JointSprings)

@@ -20,6 +20,9 @@ BOUNDLESS = 1e30
 # Of the tracking residual; makes torques unique where several serve as well.
 SMALL = 1e-8
 
+# Of daqp's proximal steps, which it needs as forces and most accelerations cost nothing.
+PROXIMAL = 1e-6
+
 
 @dataclass(frozen=True)
 class Situation:
@@ -123,7 +126,7 @@ class LeastResidual(Tracking):
             upper,
             lower,
             sense,
-            eps_prox=1e-6,
+            eps_prox=PROXIMAL,
         )
         if flag != SOLVED:
             raise np.linalg.LinAlgError("no torques within the limits keep the feet on the ground")

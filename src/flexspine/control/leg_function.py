@@ -19,11 +19,12 @@ class LegFunction:
     """The joints of a robot with a level trunk, from where its feet are.
 
     Places and velocities of feet have shape (legs, 2), in the order of the legs, x forward, y up,
-    from the middle between the hips.
+    from the middle between the hips, whose own places are ``hips``.
     """
 
     def __init__(self, robot: Robot, legs: Mapping[str, Leg]) -> None:
         self._robot, self._legs = robot, legs
+        self.hips = np.array([[leg.hip, 0.0] for leg in legs.values()])
         still = sp.zeros(2, 1)
         feet, inputs = {}, []
         for leg in legs:
@@ -65,10 +66,11 @@ class LegFunction:
 
 
 def standing(robot: Robot, height: float, ahead: Mapping[str, float]) -> Array:
-    """``q`` of a robot that stands still with its hips at ``height`` (m).
+    """Return the coordinates ``q`` of a robot that stands with its hips at ``height`` (m).
 
-    Feet are below their hips, or ``ahead`` of them by so many m, by leg. Raises `ParameterError`
-    for a robot without legs to stand on, and for feet that are out of reach.
+    Shape (N,), in the order of its linkage, SI. Feet are on level ground below their hips, or
+    ``ahead`` of them by so many m, by leg. Raises `ParameterError` for a robot without legs to
+    stand on, and for feet that are out of reach.
     """
     legs = legs_of(robot)
     for name, leg in legs.items():

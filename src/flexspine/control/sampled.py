@@ -9,13 +9,13 @@ import sympy as sp
 
 from flexspine.control.clocked import Clocked
 from flexspine.control.laws import Law, Tracking
-from flexspine.control.walking import Walker
+from flexspine.control.walking import WalkingDrive
 from flexspine.hybrid.compile import Array
 from flexspine.models.drive import Moment
 
 
 @dataclass(frozen=True)
-class Sampled(Clocked, Walker):
+class Sampled(Clocked, WalkingDrive):
     """Walk by a law, such as one of `flexspine.control.laws`."""
 
     law: Law = field(default_factory=Tracking)

@@ -26,10 +26,11 @@ SOFTER = 0.5
 
 @dataclass(frozen=True)
 class SpineComparison:
-    """Runs and measures by controller and body (``flexible``, ``locked``).
+    """A flexible and a locked spine side by side.
 
-    ``motion_change`` (rad) and ``torque_change`` (N m) are what half the stiffness of the spine
-    changes at most in the joints' angles and in the torques under computed torque.
+    ``runs`` and their ``summaries`` are by controller (``com``, ``pd``) and body (``flexible``,
+    ``locked``). ``motion_change`` (rad) and ``torque_change`` (N m) are what half the stiffness of
+    the spine changes at most in the joints' angles and in the torques under computed torque.
     """
 
     runs: dict[tuple[str, str], RobotRun]
@@ -51,9 +52,11 @@ class SpineComparison:
 def compare_spines(
     robot: Robot, asked: Trot, progress: Callable[[float], None] | None = None
 ) -> SpineComparison:
-    """Let a robot trot with its spine and with the spine locked straight, under `COMPARED` laws.
+    """Let a robot trot with its spine and with the spine locked straight.
 
-    Raises `ParameterError` for a robot without a spine, a joint without motor between legs.
+    Both are controlled by ``com`` and by ``pd``, under which the spine can move; all else is as
+    ``asked``. ``progress`` is told the share that is done, 0 to 1. Raises `ParameterError` for a
+    robot without a spine, a joint without motor between two parts of its trunk.
     """
     joint = spine_of(robot)
     bodies = {"flexible": robot, "locked": locked(robot, joint)}

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from flexspine.control.steering import Steering
 from flexspine.errors import FlexspineError, ParameterError, UnknownNameError
 from flexspine.gaits.gait import Gait
-from flexspine.gaits.problem import ANGLES
 from flexspine.gaits.return_map import linearize, section_rows
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
@@ -25,6 +24,7 @@ from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.system import Section
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.bounder import STOOD
+from flexspine.models.legs import ANGLES
 from flexspine.models.model import Model, check_between
 
 METHODS = ("lqr", "deadbeat")
@@ -55,10 +55,12 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Stabilizer(Steering):
-    """Linear feedback around a gait: ``u = u0 - K (x - x0)``, in natural units.
+    """Linear feedback around a gait, ``u = u0 - K (x - x0)``, as `stabilize` designs it.
 
-    ``gains`` has a matrix (u, d) for the apex after both stances and, if it acts twice a stride,
-    one for the apex between them.
+    ``inputs`` are what is steered, by dotted name, ``method`` is how gains were found. ``gains``
+    has a matrix (u, d) in natural units for the apex after both stances and, if it acts twice a
+    stride, one for the apex between them; ``parts`` are the derivatives of the stride from each of
+    these to the next.
     """
 
     gait: Gait
@@ -92,7 +94,7 @@ class Stabilizer(Steering):
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Those of the stride under feedback, largest first."""
+        """Floquet multipliers of the stride under feedback, largest first, shape (d,)."""
         whole = np.eye(len(self.parts[0].matrix))
         for part, gain in zip(self.parts, self.gains, strict=True):
             whole = (part.matrix - part.inputs @ gain) @ whole
@@ -101,18 +103,18 @@ class Stabilizer(Steering):
 
     @cached_property
     def level_spectral_radius(self) -> float:
-        """The largest multiplier but for the one that a conserved energy makes 1."""
+        """The largest magnitude of a multiplier but that of a conserved energy, which is 1."""
         sizes = np.abs(self.multipliers)
         if len(self.parts[0].level) == len(sizes):
             return float(sizes[0])
         return float(np.sort(np.delete(sizes, np.argmin(np.abs(self.multipliers - 1))))[-1])
 
     def at_apex(self, apex: Array) -> Array:
-        """The gait's inputs, corrected."""
+        """Return the gait's inputs, corrected."""
         return self._corrected(0, apex)
 
     def between(self, apex: Array, before: Array) -> Array:
-        """The gait's inputs, corrected anew if it acts twice."""
+        """Return the gait's inputs, corrected anew if it acts twice."""
         return self._corrected(1, apex) if self.twice else before
 
     @cached_property
@@ -122,7 +124,7 @@ class Stabilizer(Steering):
 
     @cached_property
     def usual(self) -> Array:
-        """The inputs of the gait, shape (u,)."""
+        """The inputs of the gait, shape (u,), SI."""
         return np.array([self.gait.model.numbers[name] for name in self.inputs])
 
     def _corrected(self, number: int, apex: Array) -> Array:
@@ -143,10 +145,10 @@ def stabilize(
     """Design feedback from the apex (``twice``: from both flight apexes) to ``inputs``.
 
     ``inputs`` are parameters by dotted name: touchdown angles, thrust such as ``legs.extension``.
-    ``method`` is ``lqr``, which weighs deviations against ``effort`` times what steering takes, or
-    ``deadbeat``, which is done in as few strides as can be. Raises `UnknownNameError`,
-    `ParameterError` for what cannot be asked for, and `FlexspineError` for a gait that cannot be
-    stabilised so.
+    ``method`` is ``lqr`` (a linear quadratic regulator), which weighs deviations against ``effort``
+    times what steering takes, in natural units, or ``deadbeat``, which is done in as few strides as
+    can be. Raises `UnknownNameError`, `ParameterError` for what cannot be asked for, and
+    `FlexspineError` for a gait that cannot be stabilised so.
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
@@ -201,7 +203,7 @@ def _parts(gait: Gait, inputs: tuple[str, ...], twice: bool) -> tuple[Part, ...]
         if not trajectory.outcome.completed:
             raise FlexspineError(
                 f"the gait has no apex between its stances ({trajectory.outcome})",
-                "act once a stride (--once)",
+                "act once a stride",
             )
         found = linearize(trajectory, symbols)
         at = section_rows(system)

@@ -16,7 +16,8 @@ import sympy as sp
 
 from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.gaits.return_map import section_rows
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import HybridSystem, Mode
@@ -41,8 +42,9 @@ FARTHEST = 0.25
 class Noise:
     """What measuring and acting are off by, drawn anew at every apex.
 
-    ``sensing`` is Gaussian, in the natural units of the apex coordinates. ``acting`` is relative to
-    what was to be done: its half-width if ``uniform``, its standard deviation otherwise.
+    ``sensing`` is the standard deviation of Gaussian noise on the apex coordinates, in their
+    natural units. ``acting`` is relative to what was to be done: the half-width of even noise if
+    ``uniform``, the standard deviation of Gaussian noise otherwise. Raises `ParameterError`.
     """
 
     sensing: float = 0.0
@@ -59,14 +61,17 @@ class Noise:
 
 
 class Steering(ABC):
-    """What a controller does at apexes. ``inputs`` are the parameters it sets, by dotted name."""
+    """What a controller does at apexes; controllers are kinds of it, such as `Stabilizer`.
+
+    ``inputs`` are the parameters it sets, by dotted name: touchdown angles, thrust.
+    """
 
     inputs: tuple[str, ...]
 
     @property
     @abstractmethod
     def settings(self) -> dict[str, Any]:
-        """All that decides what it does, for a file."""
+        """All that decides what it does, as JSON holds it."""
 
     @abstractmethod
     def check(self, model: Model) -> None:
@@ -74,13 +79,14 @@ class Steering(ABC):
 
     @abstractmethod
     def at_apex(self, apex: Array) -> Array:
-        """The inputs (u,) for section coordinates (d,) at an apex after both stances.
+        """Return the inputs (u,) for section coordinates (d,) at an apex after both stances.
 
-        Where the ground is not flat the height is that above the ground below the CoM.
+        SI and radians. Where the ground is not flat the height is that above the ground below the
+        CoM.
         """
 
     def between(self, apex: Array, before: Array) -> Array:
-        """The inputs at an apex between the stances; ``before`` are those at work now."""
+        """Return the inputs at an apex between the stances; ``before`` are those at work now."""
         return before
 
 
@@ -216,7 +222,10 @@ def _between(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | 
 
 @dataclass(frozen=True)
 class SteeredRun(Run):
-    """A run that was steered; ``model`` is where it began."""
+    """A `Run` under a controller, ``steering``; ``model`` is where it began.
+
+    ``noise`` and its ``seed`` are those that the run was made with.
+    """
 
     steering: Steering = field(kw_only=True)
     noise: Noise = field(kw_only=True)
@@ -237,7 +246,7 @@ class SteeredRun(Run):
 
     @property
     def inputs(self) -> list[dict[str, float]]:
-        """What was steered, from each apex of `apexes` on, by name."""
+        """What was steered, from each apex of ``apexes`` on, by name."""
         bound = self.trajectory.bound
         assert isinstance(bound, SteeredBounder)
         return [bound.inputs_of(point) for point in self.section_points]
@@ -255,9 +264,10 @@ def steer(
 ) -> SteeredRun:
     """Simulate ``strides`` strides from the model's apex under a controller.
 
-    Without ``record`` only the apexes are kept, not the motion between them. The same seed repeats
-    the same noise. A run that falls is no error: look at ``outcome``. Raises `ParameterError` and
-    `UnknownNameError`.
+    ``steering`` is one, such as `stabilize` designs. Without ``record`` only the apexes are kept,
+    not the motion between them. ``noise`` is none by default; the same seed repeats the same.
+    ``tolerance`` is the integrator's, between 1e-17 and 1e-3. A run that falls is no error: look at
+    ``outcome``. Raises `ParameterError` and `UnknownNameError`.
     """
     wanted = check_count("strides", strides)
     seed = check_seed(seed)

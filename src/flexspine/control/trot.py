@@ -45,14 +45,15 @@ Driven = ComputedTorque | Sampled | SpringDriven | CpgDriven
 
 @dataclass(frozen=True)
 class Trot:
-    """What is asked of a trot, in SI units.
+    """What is asked of a trot of some ``seconds``, in SI units.
 
-    ``controller`` is one of `CONTROLLERS`: ``tracking`` (computed torque), ``qp`` (the same as
-    nearly as contacts and limits allow), ``com`` (centre of mass, pitch and swing legs; the spine
-    moves), ``pd`` (springs and dampers at the joints) or ``cpg`` (the same, drawn after coupled
-    oscillators that know nothing of the ground). ``rate`` in Hz is how often torques are chosen,
-    None: all the time, where the law allows it. ``limit`` bounds them. ``push`` is an
-    impulse in N s along x on the body at ``push_time``.
+    ``controller`` is ``tracking`` (computed torque), ``qp`` (the same as nearly as contacts and
+    limits allow), ``com`` (centre of mass, pitch and swing legs; the spine moves), ``pd`` (springs
+    and dampers at the joints) or ``cpg`` (the same, drawn after coupled oscillators that know
+    nothing of the ground). ``rate`` in Hz is how often torques are chosen, None: all the time,
+    where the law allows it. ``limit`` (N m) bounds them. ``stiffness`` and ``damping`` are those of
+    the law, None: its own; in 1/s^2 and 1/s, of ``pd`` and ``cpg`` in N m/rad and N m s/rad.
+    ``push`` is an impulse in N s along x on the body at ``push_time`` (s), by default half-way.
     """
 
     seconds: float = 20.0
@@ -73,11 +74,11 @@ def trot(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[float], None] | None = None,
 ) -> RobotRun:
-    """Let a robot trot from standing.
+    """Let a planar robot trot from standing.
 
-    A run that falls is no error: look at ``outcome``. ``progress`` is told the share that is done,
-    0 to 1. Raises `ParameterError` and `UnknownNameError` for what cannot be asked for, and for a
-    robot that has no legs to trot on.
+    ``tolerance`` is the integrator's, between 1e-17 and 1e-3. A run that falls is no error: look at
+    ``outcome``. ``progress`` is told the share that is done, 0 to 1. Raises `ParameterError` and
+    `UnknownNameError` for what cannot be asked for, and for a robot that has no legs to trot on.
     """
     asked = Trot() if wanted is None else wanted
     drive = driven(robot, asked)

@@ -21,17 +21,19 @@ INTERVAL = 1e-3
 
 @dataclass(frozen=True)
 class WalkSummary:
-    """A walk in numbers, in SI units.
+    """A walk of a planar robot in numbers, in SI units and radians.
 
-    ``speed`` and ``cost_of_transport`` are of the whole steps in the second half of the run (None
-    if there are none), all else of the whole run, sampled every millisecond. ``normal`` is the
-    range of the normal forces on feet that are to stand, ``friction_demand`` the largest ratio of
-    tangential to normal force of feet that stand without sliding, ``sliding`` the share of time
-    in which some foot slides. ``impulse`` is the largest normal impulse on a foot, ``drift`` how
-    far a foot that sticks gets from where it landed, ``error`` and ``mean_error`` (root mean
-    square) what joints are off their references. ``cost_of_transport`` is the work of all motors,
-    negative work counted as positive, per weight and distance. ``spine`` gives the range of every
-    joint without motor, ``imbalance`` the energy that is not accounted for.
+    ``steps`` were done, ``distance`` is that of the CoM. ``speed`` and ``cost_of_transport`` are of
+    the whole steps in the second half of the run (None if there are none), all else of the whole
+    run, sampled every millisecond. ``normal`` is the range of the normal forces on feet that are to
+    stand, ``friction_demand`` the largest ratio of tangential to normal force of feet that stand
+    without sliding, ``sliding`` the share of time in which some foot slides. ``peak_force`` is the
+    largest force on a foot, ``impulse`` the largest normal impulse, ``torque`` the largest of a
+    motor, ``drift`` how far a foot that sticks gets from where it landed, ``error`` and
+    ``mean_error`` (root mean square) what joints are off their references. ``cost_of_transport`` is
+    the work of all motors, negative work counted as positive, per weight and distance. ``height``
+    is the range of the CoM's, ``pitch`` that of the trunk's, ``spine`` that of every joint without
+    motor; ``imbalance`` is the energy that is not accounted for.
     """
 
     steps: int
@@ -54,7 +56,10 @@ class WalkSummary:
 
 
 def summarize_walk(run: RobotRun) -> WalkSummary:
-    """Measure a run of a robot that walks. Raises `FlexspineError` if it did not even begin."""
+    """Measure a run of a planar robot that walks.
+
+    Raises `FlexspineError` if it did not even begin.
+    """
     dataset = robot_dataset(run, interval=INTERVAL)
     if not dataset.sizes["time"]:
         # No InputError: its exit code is that of a run that ended without its goal.

@@ -30,11 +30,12 @@ PASSED = -1.0
 
 @dataclass(frozen=True)
 class Pace:
-    """How to walk, in SI units.
+    """How a planar robot is to walk, in SI units.
 
-    ``height`` is that of the hips, ``stance`` how long a pair of legs stands, ``clearance`` how
-    high feet are lifted, ``landing`` how fast they come down, ``ramp`` the number of steps until
-    the ``speed`` is reached, and until the robot steps in place again from ``stop`` (s) on.
+    ``speed`` is that of the trunk (m/s), ``height`` that of the hips (m), ``stance`` how long a
+    pair of legs stands (s), ``clearance`` how high feet are lifted (m), ``landing`` how fast they
+    come down (m/s), ``ramp`` the number of steps until the speed is reached, and until the robot
+    steps in place again from ``stop`` (s) on.
     """
 
     speed: float = 0.3
@@ -46,19 +47,19 @@ class Pace:
     stop: float = inf
 
     def speed_after(self, time: float, speed: float, steps: int) -> float:
-        """The speed that is wanted some steps after one at ``time`` (s) with ``speed``."""
+        """Return the speed (m/s) to have some steps after one at ``time`` (s) with ``speed``."""
         aim = self.speed if time < self.stop else 0.0
         most = steps * abs(self.speed) / self.ramp
         return speed + min(max(aim - speed, -most), most)
 
     @property
     def highest(self) -> float:
-        """What no foot is lifted above; ``s^2 (1 - s)`` is 4/27 at most."""
+        """What no foot is lifted above, in m; ``s^2 (1 - s)`` is 4/27 at most."""
         return self.clearance + self.landing * self.stance * 4 / 27
 
 
 @dataclass(frozen=True)
-class Walk:
+class WalkPlan:
     """The plan of a walk for one robot."""
 
     robot: Robot

@@ -21,8 +21,9 @@ from flexspine.control.references import (
     leg_numbers,
     references,
 )
-from flexspine.control.walk_plan import STEP, SWING_END, Pace, Walk
-from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.control.walk_plan import STEP, SWING_END, Pace, WalkPlan
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard
 from flexspine.hybrid.trajectory import HybridState
@@ -40,15 +41,15 @@ OUT_OF_REACH = OutcomeKind(
 
 
 @dataclass(frozen=True)
-class Walker(Drive):
+class WalkingDrive(Drive):
     """A drive that walks; how torques follow from what joints are to do is left to its kinds."""
 
     gait: Pace = field(default_factory=Pace)
 
     @cached_property
-    def walk(self) -> Walk:
+    def walk(self) -> WalkPlan:
         """The plan."""
-        return Walk(self.robot, self.gait)
+        return WalkPlan(self.robot, self.gait)
 
     @cached_property
     def references(self) -> References:
@@ -167,7 +168,7 @@ class Walker(Drive):
 def _swing_over(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | None:
     """Feet that ought to have landed sink until they do."""
     assert isinstance(bound, BoundRobot)
-    assert isinstance(bound.drive, Walker)
+    assert isinstance(bound.drive, WalkingDrive)
     moment = bound.moment(point)
     held = bound.drive.walk.swing_over(moment.held, moment.time)
     return bound.carry_on(replace(moment, held=held), point.states)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexspine.engines.installed import LEAST_INERTIA
+from flexspine.engines.installed import LEAST_INERTIA, constant_impedance, empty_specification
 from flexspine.errors import ParameterError
 from flexspine.models.actuation import Features
 from flexspine.models.flexible_bounder import FLEXIBLE_BOUNDER
@@ -52,14 +52,8 @@ def check_bounder(bounder: Model) -> None:
 def specification(mujoco: Any, bounder: Model, toe: float, step: float) -> Any:
     """The bounder as an `MjSpec`, hung up at its spine joint; mass of a toe in kg, step in s."""
     given = values(bounder.parameters)
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec = empty_specification(mujoco, (0.0, -given["gravity"], 0.0))
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.gravity = [0.0, -given["gravity"], 0.0]
-    # A run that diverged is not to begin anew behind our back.
-    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    spec.option.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
     parent = spec.worldbody
     for side in SIDES:
@@ -79,7 +73,7 @@ def specification(mujoco: Any, bounder: Model, toe: float, step: float) -> Any:
         reach.springref = length
         pin = spec.add_equality(name=side, type=mujoco.mjtEq.mjEQ_CONNECT, active=False)
         pin.objtype, pin.name1, pin.name2 = mujoco.mjtObj.mjOBJ_BODY, point.name, "world"
-        pin.solref, pin.solimp = [PIN * step, 1], [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2]
+        pin.solref, pin.solimp = [PIN * step, 1], constant_impedance(IMPEDANCE)
     # Forces may have quadratic and cubic parts there; ours are linear.
     spine.stiffness = [given["spine.stiffness"], 0, 0]
     spine.damping = [given["spine.damping"], 0, 0]

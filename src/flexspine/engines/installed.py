@@ -1,4 +1,4 @@
-"""MuJoCo, if it is there and of a version that will do, and what it cannot be told."""
+"""MuJoCo, if it is there and of a version that will do, and what all its models have alike."""
 
 from __future__ import annotations
 
@@ -39,6 +39,28 @@ def mujoco_module() -> Any:
             REMEDY,
         )
     return mujoco
+
+
+def empty_specification(mujoco: Any, gravity: tuple[float, float, float]) -> Any:
+    """An `MjSpec` without bodies, in radians, whose bodies have the inertias that they are given.
+
+    ``gravity`` is in m/s^2. Energies are computed, and a run that diverged is not begun anew.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.option.gravity = gravity
+    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    spec.option.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    return spec
+
+
+def constant_impedance(impedance: float) -> list[float]:
+    """MuJoCo's ``solimp`` of a constraint that is as hard anywhere.
+
+    Width, midpoint and power, the last three, shape the way between two impedances.
+    """
+    return [impedance, impedance, 1e-3, 0.5, 2.0]
 
 
 @contextmanager

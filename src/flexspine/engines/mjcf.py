@@ -14,7 +14,7 @@ import numpy as np
 
 from flexspine.control.leg_function import standing
 from flexspine.engines.contact import IMPEDANCE, TANGENTIAL, ContactLaw
-from flexspine.engines.installed import LEAST_INERTIA
+from flexspine.engines.installed import LEAST_INERTIA, constant_impedance, empty_specification
 from flexspine.hybrid.compile import Array
 from flexspine.models.space import OUT, PITCH, Part, SpaceRobot
 
@@ -87,18 +87,20 @@ def specification(
             law = ContactLaw.of(space.numbers, float(model.body_invweight0[body][0]))
             pair.solref = law.solref
             pair.solreffriction = law.solreffriction
-            pair.solimp = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2.0]
+            pair.solimp = constant_impedance(IMPEDANCE)
     return spec
 
 
 def _drawn(mujoco: Any, space: SpaceRobot, ground: bool) -> Any:
-    spec = mujoco.MjSpec()
+    spec = empty_specification(mujoco, (0.0, 0.0, -space.robot.linkage.gravity))
     spec.modelname = space.robot.name
     spec.comment = (
         f"{space.robot.source.title}. Made by flexspine. SI units, radians; x forward, y left, z "
         "up. Hinges about -y are counter-clockwise seen from the right; all links are in line at 0."
     )
-    _set_options(mujoco, spec, space.robot.linkage.gravity)
+    spec.option.timestep = STEP
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = TANGENTIAL
     _draw_scene(mujoco, spec, ground)
     start = standing_start(space)
     bodies: dict[str | None, Any] = {None: spec.worldbody}
@@ -128,18 +130,6 @@ def _drawn(mujoco: Any, space: SpaceRobot, ground: bool) -> Any:
             name=motor, target=motor, trntype=mujoco.mjtTrn.mjTRN_JOINT, gear=[1, 0, 0, 0, 0, 0]
         )
     return spec
-
-
-def _set_options(mujoco: Any, spec: Any, gravity: float) -> None:
-    spec.compiler.degree = False
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    spec.option.timestep = STEP
-    spec.option.gravity = [0, 0, -gravity]
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = TANGENTIAL
-    # A run that diverged is not to begin anew behind our back.
-    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    spec.option.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
 
 
 def _draw_scene(mujoco: Any, spec: Any, ground: bool) -> None:

@@ -43,7 +43,7 @@ SLIVER = 1e-12
 INSTANT = 1e-10
 
 
-class Contact(NamedTuple):
+class LegEvent(NamedTuple):
     """What happened to a leg, named as in our runs ("fore touchdown"), and when, in s."""
 
     name: str
@@ -62,7 +62,7 @@ class BounderMotion(NamedTuple):
     com: Array
     pitches: Array
     forces: Array
-    contacts: tuple[Contact, ...]
+    contacts: tuple[LegEvent, ...]
 
     @property
     def peaks(self) -> Array:
@@ -157,7 +157,7 @@ class MujocoBounder:
         for leg in self._legs:
             leg.armed = self._margin(leg) > 0
 
-    def advance(self, step: float) -> list[Contact]:
+    def advance(self, step: float) -> list[LegEvent]:
         """Take one step of at most ``step`` s, up to the next event; returns what happened."""
         self._hold()
         self._mujoco.mj_getState(self.model, self.data, self._before, self._kept)
@@ -203,12 +203,12 @@ class MujocoBounder:
         damped = leg.numbers.damping * self.data.qvel[leg.slide]
         return float(leg.numbers.stiffness * short - damped)
 
-    def _change(self, leg: _MovingLeg) -> Contact:
+    def _change(self, leg: _MovingLeg) -> LegEvent:
         if leg.stands:
             self._let_go(leg)
-            return Contact(f"{leg.side} lift-off", float(self.data.time))
+            return LegEvent(f"{leg.side} lift-off", float(self.data.time))
         self._pin(leg)
-        return Contact(f"{leg.side} touchdown", float(self.data.time))
+        return LegEvent(f"{leg.side} touchdown", float(self.data.time))
 
     def _pin(self, leg: _MovingLeg) -> None:
         """The toe stays where it is, on the ground; the rest is up to the leg's spring."""

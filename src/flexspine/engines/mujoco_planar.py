@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexspine.engines.installed import LEAST_INERTIA, mujoco_module, unheard
-from flexspine.mechanics.linkage import Array, Link, Linkage
+from flexspine.engines.installed import LEAST_INERTIA, empty_specification, mujoco_module, unheard
+from flexspine.mechanics.linkage import Array, Linkage
 from flexspine.mechanics.rerooting import rerooted
 
 
-class Motion(NamedTuple):
+class PinnedMotion(NamedTuple):
     """What an engine has found: absolute angles in rad (k, links) and the total energy in J (k,).
 
     The energy is kinetic, of weight with zero at the foot, and of springs.
@@ -40,7 +40,7 @@ class PinnedMujoco:
         # Where each of the tree's links stands among those of the linkage.
         self._order = [linkage.place[link.name] for link in self._tree.links]
 
-    def run(self, angles: Array, step: float, count: int, every: int) -> Motion:
+    def run(self, angles: Array, step: float, count: int, every: int) -> PinnedMotion:
         """Let go from rest at absolute ``angles`` (rad), by ``count`` Runge-Kutta steps (s).
 
         Returns the start and every ``every``-th step after it; NaN from where it diverged.
@@ -55,7 +55,7 @@ class PinnedMujoco:
                 if number % every == 0:
                     found.append(self._now())
         turns, energies = zip(*found, strict=True)
-        return Motion(np.array(turns), np.array(energies))
+        return PinnedMotion(np.array(turns), np.array(energies))
 
     def _relative(self, angles: Array) -> Array:
         """MuJoCo's joint angles."""
@@ -78,19 +78,13 @@ def pinned_specification(mujoco: Any, linkage: Linkage, foot: str) -> Any:
     Our plane is that of its x and y, gravity acts against y. Raises `UnknownNameError`.
     """
     tree = rerooted(linkage, foot)
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec = empty_specification(mujoco, (0.0, -tree.gravity, 0.0))
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.gravity = [0.0, -tree.gravity, 0.0]
-    off = mujoco.mjtDisableBit
-    # A run that diverged is not to begin anew behind our back.
-    spec.option.disableflags = int(off.mjDSBL_CONSTRAINT | off.mjDSBL_AUTORESET)
-    spec.option.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     joints = {joint.link: joint for joint in tree.joints}
     bodies: dict[str | None, Any] = {None: spec.worldbody}
     for link in tree.links:
-        mass, com, inertia = _with_feet(tree, link)
+        mass, com, inertia = tree.with_feet(link.name)
         body = bodies[link.name] = bodies[link.parent].add_body(
             name=link.name,
             pos=[link.at, 0.0, 0.0],
@@ -109,12 +103,3 @@ def pinned_specification(mujoco: Any, linkage: Linkage, foot: str) -> Any:
             hinge.stiffness, hinge.damping = [joint.stiffness, 0, 0], [joint.damping, 0, 0]
             hinge.springref = joint.rest
     return spec
-
-
-def _with_feet(tree: Linkage, link: Link) -> tuple[float, float, float]:
-    """Mass, centre of mass and inertia about it of a link with its feet, which are points."""
-    parts = [(link.mass, link.com, link.inertia)]
-    parts += [(foot.mass, foot.at, 0.0) for foot in tree.feet if foot.link == link.name]
-    mass = sum(part for part, _, _ in parts)
-    com = sum(part * at for part, at, _ in parts) / mass
-    return mass, com, sum(own + part * (at - com) ** 2 for part, at, own in parts)

@@ -27,12 +27,14 @@ BACKENDS = ("egl", "osmesa")
 
 EMPTY = "<mujoco/>"
 
+# s; a time this little before a sample is at it.
+ROUNDING = 1e-9
+
 
 def opengl() -> str | None:
     """Which OpenGL can draw here without a screen, if any."""
     script = f"import mujoco, os; mujoco.Renderer(mujoco.MjModel.from_xml_string({EMPTY!r}), 8, 8)"
-    own = os.environ.get("MUJOCO_GL")
-    for backend in (own,) if own else BACKENDS:
+    for backend in _backends():
         done = subprocess.run(
             [sys.executable, "-c", f"{script}; os._exit(0)"],
             env={**os.environ, "MUJOCO_GL": backend},
@@ -44,6 +46,12 @@ def opengl() -> str | None:
     return None
 
 
+def _backends() -> tuple[str, ...]:
+    """Which OpenGL to try, in turn."""
+    own = os.environ.get("MUJOCO_GL")
+    return (own,) if own else BACKENDS
+
+
 def rendered(
     run: SpaceRun, times: NDArray[np.float64], size: tuple[int, int] = (WIDTH, HEIGHT)
 ) -> Iterator[Picture]:
@@ -53,7 +61,7 @@ def rendered(
     OSMesa, before the first picture.
     """
     mujoco = mujoco_module()
-    places = np.searchsorted(run.samples["time"], times + 1e-9, side="right") - 1
+    places = np.searchsorted(run.samples["time"], times + ROUNDING, side="right") - 1
     with TemporaryDirectory(prefix="flexspine-") as folder:
         model, postures = Path(folder) / "model.mjb", Path(folder) / "postures.npy"
         compiled = specification(mujoco, run.space).compile()
@@ -64,13 +72,12 @@ def rendered(
 
 
 def _pictures(arguments: list[str], count: int, size: tuple[int, int]) -> Iterator[Picture]:
-    own = os.environ.get("MUJOCO_GL")
     told = ""
-    for backend in (own,) if own else BACKENDS:
+    for backend in _backends():
         command = [sys.executable, "-m", "flexspine.engines.frames", *arguments]
         with subprocess.Popen(
             command,
-            env={**os.environ, "MUJOCO_GL": str(backend)},
+            env={**os.environ, "MUJOCO_GL": backend},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
         ) as child:

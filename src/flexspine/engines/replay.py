@@ -22,7 +22,7 @@ STIFFNESS, DAMPING = 400.0, 4.0
 
 
 @dataclass(frozen=True)
-class Motion:
+class PlanarMotion:
     """A motion of a planar robot: times (s), ``q`` (k, N), rates, torques of motors (k, m)."""
 
     times: Array
@@ -50,7 +50,7 @@ class Replay:
     spine: int | None
 
 
-def replay(robot: Robot, motion: Motion, *, step: float) -> Replay:
+def replay(robot: Robot, motion: PlanarMotion, *, step: float) -> Replay:
     """Replay a motion with MuJoCo's time ``step`` (s), which divides the time between samples.
 
     Raises `MachineError` without a MuJoCo that will do, and `ParameterError` for a robot that is

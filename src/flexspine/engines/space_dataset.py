@@ -56,7 +56,7 @@ def space_dataset(run: SpaceRun) -> xr.Dataset:
     """Return a run in space over ``time`` (s), at every sample of its controller.
 
     Dimensions are ``joint``, ``motor``, ``link``, ``foot_name`` and ``axis`` (x forward, y left,
-    z up), all by name; `SPACE_VARIABLES` tells what there is. Attributes carry parameters,
+    z up), all by name; variables tell their meaning and their unit. Attributes carry parameters,
     settings, the law of contact, versions and outcome.
     """
     import xarray as xr

@@ -19,10 +19,16 @@ from flexspine.parameters import values
 # Of their duration; runs are measured over whole strides after this much of them.
 SETTLED = 0.5
 
+# s; how long the shock of a touchdown lasts.
+SHOCK = 0.02
+
+# Of a count of strides, and s; what rounding leaves.
+ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class SpaceSummary:
-    """A run in space in numbers, in SI units.
+    """A run in space in numbers, in SI units and radians.
 
     All but ``distance``, ``deepest``, ``torque`` and ``imbalance`` are of the whole strides in the
     second half of the run, None or nothing if it did not come so far. ``speed`` is along the mean
@@ -62,19 +68,15 @@ class SpaceSummary:
     imbalance: float
 
 
-# s; how long the shock of a touchdown lasts.
-SHOCK = 0.02
-
-
 def summarize_space(run: SpaceRun) -> SpaceSummary:
-    """Measure a run in space."""
+    """Measure a run in space, over the whole strides in its second half."""
     samples = run.samples
     time, com = samples["time"], samples["com"]
     energy = samples["kinetic_energy"] + samples["potential_energy"]
     losses = samples["contact_loss"] + samples["damper_loss"]
     balance = energy + losses - samples["motor_work"]
     frequency = run.walk.gains.gait.frequency
-    strides = int(run.duration * frequency + 1e-9)
+    strides = int(run.duration * frequency + ROUNDING)
     whole: dict[str, Any] = {
         "strides": strides,
         "distance": float(np.hypot(*(com[-1] - com[0])[:2])),
@@ -82,13 +84,13 @@ def summarize_space(run: SpaceRun) -> SpaceSummary:
         "deepest": float(samples["depth"].max()),
         "imbalance": float(np.abs(balance - balance[0]).max()),
     }
-    count = int(run.duration * (1 - SETTLED) * frequency + 1e-9)
+    count = int(run.duration * (1 - SETTLED) * frequency + ROUNDING)
     if count < 1 or not run.outcome.completed:
         names = set(SpaceSummary.__dataclass_fields__) - set(whole)
         nothing: dict[str, Any] = {**dict.fromkeys(names), "spine": {}}
         return SpaceSummary(**whole, **nothing)
     # A window whose edges are samples, as nearly whole strides as these allow.
-    first = int(np.searchsorted(time, time[-1] - count / frequency - 1e-9))
+    first = int(np.searchsorted(time, time[-1] - count / frequency - ROUNDING))
     return SpaceSummary(**whole, **_steady(run, slice(first, None), count))
 
 

@@ -32,15 +32,20 @@ from flexspine.parameters import check_seed
 # rad/s; joints of a robot never turn faster, numbers that have gone wrong do.
 FASTEST = 1e4
 
+# Of a count of time steps: what division leaves over a whole number.
+ROUNDING = 1e-9
+
 # s; between two looks of whoever wants to know how far it is.
 TOLD = 0.1
 
 
 @dataclass(frozen=True)
 class SpaceRun:
-    """A run in space: what was asked for, how it ended, and samples of everything by name.
+    """A run in space; `space_dataset` gives every quantity of it over time.
 
-    ``samples`` are taken whenever torques are chosen; their shapes begin with the times.
+    ``space`` is the robot and ``walk`` what it was to do, ``settings`` what else was asked for.
+    ``laws`` tell by foot how it meets the ground. ``samples`` by name are taken whenever torques
+    are chosen; their shapes begin with the times. ``outcome`` tells how the run ended.
     """
 
     space: SpaceRobot
@@ -98,14 +103,10 @@ class CpgCourse:
     def _function(self) -> LegFunction:
         return LegFunction(self.space.robot, self.space.legs)
 
-    @cached_property
-    def _hips(self) -> Array:
-        return np.array([[leg.hip, 0.0] for leg in self.space.legs.values()])
-
     def start(self) -> Start:
         """The robot at rest on all its feet."""
         place, _ = self._cpg.feet(self._cpg.begin())
-        return Start.of(self.space, self._function.posture(place + self._hips))
+        return Start.of(self.space, self._function.posture(place + self._function.hips))
 
     def servo(self, count: int) -> Servo:
         """What joints are to do at so many samples. Raises `ParameterError` if they cannot."""
@@ -114,7 +115,7 @@ class CpgCourse:
         beat = self._cpg.begin()
         for sample in range(count):
             place, velocity = self._cpg.feet(beat)
-            links = self._function.links(place + self._hips, velocity)
+            links = self._function.links(place + self._function.hips, velocity)
             for name, (angle, rate) in self.space.bent(links).items():
                 at = motors.index(name)
                 angles[sample, at], rates[sample, at] = angle, rate
@@ -144,7 +145,7 @@ def run_in_space(
     step: float = STEP,
     progress: Callable[[float], None] | None = None,
 ) -> SpaceRun:
-    """Let a robot walk in MuJoCo, from standing.
+    """Let a robot walk in MuJoCo for some ``seconds``, from standing.
 
     ``sensing`` (rad) is how far angles of joints are read off at most, drawn evenly from ``seed``;
     ``step`` (s) is MuJoCo's, shortened to divide the time between two samples. ``plane`` keeps the
@@ -160,34 +161,27 @@ def run_in_space(
     space = SpaceRobot(robot, plane)
     course = CpgCourse(space, walk)
     rate = walk.gains.servo.rate
-    each = ceil(1 / (rate * step) - 1e-9)
+    each = ceil(1 / (rate * step) - ROUNDING)
     engine = SpaceEngine(space, step=1 / (rate * each))
     engine.set_down(course.start())
     count = max(1, round(seconds * rate))
     servo = course.servo(count + 1)
     noise = np.random.default_rng(seed)
-    records: list[dict[str, Any]] = []
-    sums = np.zeros(3)
-    worst = np.zeros((2, len(space.balls)))
-    outcome = Outcome(COMPLETED, f"walked for {seconds:g} s")
     told = max(1, round(TOLD * rate))
+
+    def read() -> Array:
+        angles: Array = engine.angles[engine.driven]
+        if sensing:
+            angles = angles + noise.uniform(-sensing, sensing, len(angles))
+        return angles
+
+    def tell(sample: int) -> None:
+        if progress is not None and sample % told == 0:
+            progress(sample / count)
+
     with engine.unheard():
-        for sample in range(count + 1):
-            read = engine.angles[engine.driven]
-            if sensing:
-                read = read + noise.uniform(-sensing, sensing, len(read))
-            torques = servo.torques(sample, read, engine.rates[engine.driven])
-            engine.data.ctrl[:] = torques
-            engine.forward()
-            records.append(_sample(engine, sample / rate, torques, servo, sample, sums, worst))
-            ended = _ended(engine, sample / rate)
-            if ended is not None:
-                outcome = ended
-                break
-            if sample < count:
-                worst = _go(engine, each, sums)
-            if progress is not None and sample % told == 0:
-                progress(sample / count)
+        ended, records = _walk(engine, servo, rate, each, read, tell)
+    outcome = ended or Outcome(COMPLETED, f"walked for {seconds:g} s")
     names = records[0].keys()
     samples = {name: np.array([record[name] for record in records]) for name in names}
     settings = {
@@ -200,6 +194,35 @@ def run_in_space(
         "step": engine.step,
     }
     return SpaceRun(space, walk, outcome, settings, engine.laws, samples)
+
+
+def _walk(
+    engine: SpaceEngine,
+    servo: Servo,
+    rate: float,
+    each: int,
+    read: Callable[[], Array],
+    tell: Callable[[int], None],
+) -> tuple[Outcome | None, list[dict[str, Any]]]:
+    """Choose torques at all samples of a servo, ``each`` time steps apart, at ``rate`` (Hz).
+
+    Returns how the run ended before the last of them, if it did, and what was seen at each.
+    """
+    last = len(servo.angles) - 1
+    records: list[dict[str, Any]] = []
+    sums, worst = np.zeros(3), np.zeros((2, len(engine.space.balls)))
+    for sample in range(last + 1):
+        torques = servo.torques(sample, read(), engine.rates[engine.driven])
+        engine.data.ctrl[:] = torques
+        engine.forward()
+        records.append(_sample(engine, sample / rate, torques, servo, sample, sums, worst))
+        ended = _ended(engine, sample / rate)
+        if ended is not None:
+            return ended, records
+        if sample < last:
+            worst = _go(engine, each, sums)
+        tell(sample)
+    return None, records
 
 
 def _go(engine: SpaceEngine, count: int, sums: Array) -> Array:

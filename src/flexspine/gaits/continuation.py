@@ -13,9 +13,9 @@ from flexspine.gaits.checkpoint import Checkpoint
 from flexspine.gaits.family import BranchPoint, Family
 from flexspine.gaits.gait import Gait
 from flexspine.gaits.landmarks import Landmark, Segment
-from flexspine.gaits.problem import ANGLES, Problem
+from flexspine.gaits.problem import Problem
 from flexspine.gaits.tracing import CLOSED_BRANCH, LONGEST_STEP, Tracer, Tracing, land
-from flexspine.parameters import values
+from flexspine.models.legs import ANGLES
 
 MOST_POINTS = 2000
 
@@ -27,8 +27,8 @@ SAME = 1e-12
 class Branch:
     """A branch of gaits, followed in ``over`` from one end to the other.
 
-    ``points`` and ``landmarks`` are in order along it; ``ends`` say why it ends, or where it was
-    left.
+    ``points`` (each a `BranchPoint`) and ``landmarks`` are in order along it; the two ``ends`` say
+    why it ends, or where it was left. ``family`` are the equations that all its gaits solve.
     """
 
     over: str
@@ -76,18 +76,20 @@ def trace_branch(
     longest_step: float = LONGEST_STEP,
     most_points: int = MOST_POINTS,
     store: str | Path | None = None,
-    progress: Callable[[BranchPoint], None] = lambda _: None,
+    progress: Callable[[BranchPoint], None] | None = None,
 ) -> Branch:
     """Follow the branch of a gait in ``over`` both ways, until it ends or leaves ``bounds``.
 
     ``over`` is ``mean_speed``, ``energy``, an apex coordinate, ``touchdown.fore`` or ``.hind``, or
-    a parameter by its dotted name. ``fixed`` are the quantities kept, by default the gait's
-    energy, apex height and mean speed without ``over``, or, for another apex coordinate or a
-    touchdown angle, energy and height. ``free`` are further parameters that may change, such as an
-    actuator that makes good what dampers take. ``symmetric`` follows symmetric gaits only
-    (by default if the gait is one). ``store`` is a file that keeps every step; traced again with
-    the same arguments, the branch goes on from there. SI and radians. Raises `UnknownNameError`,
-    `ParameterError`, `OutputError`.
+    a parameter by its dotted name; ``bounds`` are its lowest and highest value. ``fixed`` are the
+    quantities kept, by default the gait's energy, apex height and mean speed without ``over``, or,
+    for another apex coordinate or a touchdown angle, energy and height. ``free`` are further
+    parameters that may change, such as an actuator that makes good what dampers take.
+    ``symmetric`` follows symmetric gaits only (by default if the gait is one). ``longest_step`` is
+    in natural units along the branch; each direction has ``most_points`` at the most. ``store`` is
+    a file that keeps every step; traced again with the same arguments, the branch goes on from
+    there. ``progress`` is told every point. SI and radians. By pseudo-arclength: Keller 1977.
+    Raises `UnknownNameError`, `ParameterError`, `OutputError`.
     """
     family = family_of(gait, over, fixed, symmetric, free)
     tracer = Tracer(family, bounds, longest_step, most_points)
@@ -106,7 +108,7 @@ def trace_branch(
         for state in tracer.go(tracing):
             if checkpoint is not None:
                 checkpoint.add(way, tracing, state)
-            if len(state.points) > len(tracing.points):
+            if progress is not None and len(state.points) > len(tracing.points):
                 progress(state.points[-1])
             tracing = state
         halves.append(tracing)
@@ -115,7 +117,7 @@ def trace_branch(
 
 def _description(family: Family, gait: Gait) -> dict[str, Any]:
     """All that decides what a branch looks like."""
-    problem, model = family.problem, gait.model
+    problem = family.problem
     return {
         "flexspine": __version__,
         "over": family.over,
@@ -124,10 +126,7 @@ def _description(family: Family, gait: Gait) -> dict[str, Any]:
         "symmetric": problem.symmetric,
         "strides": problem.strides,
         "tolerance": problem.tolerance,
-        "model": model.kind.name,
-        "parameters": values(model.parameters),
-        "apex": model.apex,
-        "touchdown": model.touchdown,
+        **gait.model.record(),
     }
 
 

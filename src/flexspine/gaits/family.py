@@ -10,11 +10,12 @@ import numpy as np
 
 from flexspine.gaits.gait import Gait, examine
 from flexspine.gaits.newton import Attempt, Slice, solve
-from flexspine.gaits.problem import ANGLES, Problem
+from flexspine.gaits.problem import Problem
 from flexspine.gaits.return_map import ReturnMap, linearize, section_rows
 from flexspine.gaits.stability import Stability, floquet_multipliers
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
+from flexspine.models.legs import ANGLES
 
 # Iterations of a corrector; one that needs more has started too far away.
 CORRECTOR_ITERATIONS = 8
@@ -25,11 +26,11 @@ DOUBLING, NEIMARK_SACKER, UNIT = "period doubling", "Neimark-Sacker", "multiplie
 
 @dataclass(frozen=True)
 class BranchPoint:
-    """A gait of a family.
+    """A gait of a branch, with its stability.
 
-    ``value`` is that of the quantity the family is followed in (SI), ``point`` and ``tangent``
-    (u,) are in natural units, ``tests`` vanish where something happens: a ``fold`` of the family,
-    a ``branch point``, or a multiplier on the unit circle.
+    ``value`` is that of the quantity the branch is followed in (SI); ``point`` and ``tangent``
+    (u,) are the unknowns and the direction of the branch, in natural units. ``tests`` vanish where
+    something happens: a ``fold``, a ``branch point``, or a multiplier on the unit circle.
     """
 
     gait: Gait
@@ -40,7 +41,7 @@ class BranchPoint:
     tests: Mapping[str, float] = field(default_factory=dict)
 
     def turned(self) -> BranchPoint:
-        """The same point, seen from the other direction."""
+        """Return the same point, seen from the other direction."""
         flipped = {name: -self.tests[name] for name in (FOLD, BRANCHING)}
         return replace(self, tangent=-self.tangent, tests={**self.tests, **flipped})
 

@@ -41,7 +41,7 @@ def load_gait(path: str | Path) -> Gait:
     """Read a gait from a file written by `save_gait` or by ``flexspine gait``.
 
     It is run anew; its ``flaw`` tells if it does not close any more. Raises `PresetError` for a
-    file that holds no gait, or more than one.
+    file that cannot be read, holds no gait, or more than one.
     """
     record = _only_gait(str(path), _parse(str(path)))
     try:

@@ -38,7 +38,7 @@ class Gait:
     """A periodic orbit, found at fixed touchdown angles. SI and radians.
 
     ``model`` holds its apex and touchdown angles, ``strides`` how many strides make a period,
-    ``trajectory`` is one period of it.
+    ``trajectory`` is one period of it, at the integrator's ``tolerance``.
     """
 
     model: Model
@@ -101,7 +101,7 @@ class Gait:
 
     @cached_property
     def contacts(self) -> tuple[tuple[str, ...], ...]:
-        """Touchdowns and lift-offs in order, those at one instant together."""
+        """Touchdowns and lift-offs in order, such as ``fore touchdown``; those at once together."""
         groups: list[list[str]] = []
         latest = -1.0
         for name, time in contact_times(self.trajectory):
@@ -114,12 +114,12 @@ class Gait:
 
     @property
     def touchdown_angles(self) -> dict[str, float]:
-        """Of each leg, in rad from the vertical."""
+        """Touchdown angle of each leg, in rad from the vertical, foot ahead of the hip positive."""
         return dict(self.model.touchdown)
 
     @cached_property
     def liftoff_angles(self) -> dict[str, float]:
-        """Of each leg at its latest lift-off, in rad from the vertical."""
+        """Angle of each leg at its latest lift-off, in rad from the vertical, as at touchdown."""
         held, places = self.trajectory.end.held, self.model.system.places
         return {leg.side: float(held[places[leg.left]]) for leg in (FORE, HIND)}
 
@@ -135,7 +135,7 @@ class Gait:
 
     @property
     def period(self) -> float:
-        """In s."""
+        """How long a period takes, in s."""
         return self.trajectory.duration
 
     @property
@@ -145,7 +145,7 @@ class Gait:
 
     @property
     def mean_speed(self) -> float:
-        """In m/s."""
+        """Distance over time of a period, in m/s."""
         start, end = self.trajectory.start.states, self.trajectory.end.states
         return float(end[0] - start[0]) / self.period
 
@@ -165,7 +165,7 @@ class Gait:
 
     @property
     def peak_grf(self) -> dict[str, float]:
-        """Largest magnitude of each leg's force, in N per pair of legs."""
+        """Largest magnitude of each leg's ground reaction force, in N per pair of legs."""
         return self.summary.peak_grf
 
     @property
@@ -176,7 +176,7 @@ class Gait:
 
     @cached_property
     def apex_energy_shares(self) -> dict[str, float]:
-        """Shares of the total energy at the first apex."""
+        """Shares of the total energy at the first apex: kinetic, gravity, leg and spine."""
         return {kind: self.profile.first(f"{kind}_energy") / self.energy for kind in ENERGIES}
 
     @cached_property
@@ -212,7 +212,7 @@ class Gait:
 
     @cached_property
     def orbit(self) -> Array:
-        """Its apexes in natural units, shape (apexes, coordinates), from whichever it is seen."""
+        """All its apexes in natural units, shape (apexes, coordinates)."""
         return np.array([[apex[n] / self.model.scales[n] for n in apex] for apex in self._tops()])
 
     def _tops(self) -> list[dict[str, float]]:
@@ -247,7 +247,8 @@ def _examined_anew(model: Model, strides: int, tolerance: float) -> Gait:
 def examine(model: Model, *, strides: int = 1, tolerance: float = DEFAULT_TOLERANCE) -> Gait:
     """Run one period from the model's apex, and take it for a gait; its ``flaw`` tells if not.
 
-    Raises `ParameterError` for a number of strides or a tolerance that is not usable.
+    ``strides`` make the period, ``tolerance`` is the integrator's, between 1e-17 and 1e-3. Raises
+    `ParameterError` for what is not usable, and for ground that is not flat.
     """
     model.on_flat_ground("a gait")
     check_count("strides", strides)

@@ -29,6 +29,9 @@ from flexspine.hybrid.trajectory import Trajectory
 # 1e-6 only: next to it half a stride is half done within no time, and there is no solving for it.
 LOCATED = 1e-9
 
+# Relative, of brentq; so fine that LOCATED decides.
+FINEST = 1e-12
+
 # Where an interval is cut in turn: at the very place that is looked for there may be no solution.
 SHARES = (0.5, 0.35, 0.65)
 
@@ -55,7 +58,7 @@ AT_APEX = 1e-6
 
 @dataclass(frozen=True)
 class Landmark:
-    """Something that happens on a branch.
+    """Something that happens on a `Branch`.
 
     ``kind`` is ``fold``, ``branch point``, ``symmetry breaking``, ``period doubling``,
     ``Neimark-Sacker``, ``multiplier +1``, ``contact order``, ``second touchdown``, ``grazing``,
@@ -119,7 +122,7 @@ class Segment:
             return found[distance].tests[test]
 
         try:
-            where = brentq(value, 0.0, self.length, xtol=LOCATED, rtol=1e-12)
+            where = brentq(value, 0.0, self.length, xtol=LOCATED, rtol=FINEST)
         except LookupError:
             return None  # no gait in between: what changes sign there is torn, not zero
         return found[where]

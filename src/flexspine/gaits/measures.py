@@ -57,9 +57,13 @@ class Turn(NamedTuple):
 class Summary:
     """The measures of a run. Lengths in m, times in s, forces in N per pair of legs, angles in rad.
 
-    Those of a stride (``period`` to ``froude``) are of the last completed one, or None. Peaks,
-    ``spine_range``, ``work`` by actuator and ``cost_of_transport`` are over the whole run; the last
-    is all positive work by weight and distance, None without a distance.
+    Those of a stride (``period`` to ``froude``) are of the last completed one, or None;
+    ``duty_factor`` is by leg, ``froude`` is v^2 / (g l) with the mean speed of the stride and the
+    mean rest length of the legs. Peaks by leg, ``spine_range`` (least and largest spine angle),
+    ``work`` by actuator and ``cost_of_transport`` are over the whole run; the last is all positive
+    work by weight and distance, None without a distance. ``energy`` has the ``initial`` one (J) and
+    the ``relative_drift``: the largest change, over it, of total and dissipated energy less the
+    work of actuators.
     """
 
     period: float | None
@@ -78,11 +82,8 @@ class Summary:
 
 
 def summarize(run: Run, profile: Profile | None = None) -> Summary:
-    """Measure a run.
+    """Measure a run of a bounder: its last stride, its forces, its energy.
 
-    ``froude`` is v^2 / (g l) with the mean speed of the stride and the mean rest length of the
-    legs; ``relative_drift`` the largest change, over the initial energy, of total and dissipated
-    energy less the work of actuators.
     ``profile`` spares making that of the run anew.
     """
     trajectory = run.trajectory

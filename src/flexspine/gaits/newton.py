@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -151,11 +151,10 @@ def _step(jacobian: Array, here: _Trial, cut: Slice | None) -> Array:
     return _least_squares(jacobian, residual)
 
 
-def _least_squares(jacobian: Any, residual: Any) -> Array:
+def _least_squares(jacobian: Array, residual: Array) -> Array:
     if jacobian.shape[0] == jacobian.shape[1]:
         try:
             return np.asarray(np.linalg.solve(jacobian, -residual))
         except np.linalg.LinAlgError:
             pass  # the shortest of many steps then
-    step: Array = np.linalg.lstsq(jacobian, -residual, rcond=None)[0]
-    return step
+    return np.asarray(np.linalg.lstsq(jacobian, -residual, rcond=None)[0], dtype=float)

@@ -10,24 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexspine.errors import ParameterError, UnknownNameError
 from flexspine.gaits.parameter_scale import ParameterScale
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.gaits.problem_check import check_problem
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.functions import balance, section_quantities
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.sensitivity import Deviation, propagate
 from flexspine.hybrid.trajectory import HybridState, Trajectory
-from flexspine.models.legs import SIDES
+from flexspine.models.legs import ANGLES, SIDES
 from flexspine.models.model import Model
-from flexspine.parameters import is_number, shortened, values
-
-ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
+from flexspine.parameters import values
 
 # s; no stride of a gait takes longer.
 LONGEST_STRIDE = 3.0
@@ -86,7 +84,7 @@ class Problem:
         self.symmetric, self.strides, self.tolerance = symmetric, strides, tolerance
         self.system = self.model.system
         self.compiled = compile_system(self.system, tolerance)
-        self._check()
+        check_problem(self)
         spanned = self._spanned()
         self.unknowns = tuple(name for name in (*spanned, *ANGLES, *free) if name not in self.fixed)
         self._quantities = [name for name in ("energy", "mean_speed") if name in self.fixed]
@@ -101,43 +99,6 @@ class Problem:
             self._residual_scales = np.array([model.scales[name] for name in coordinates])
         self._energy = list(self.system.section.quantities).index("energy")
         self._x = model.state_names.index("com_x")
-
-    def _check(self) -> None:
-        model, coordinates = self.model, self.system.section.coordinates
-        model.on_flat_ground("a gait")
-        known = (*coordinates, *ANGLES, "energy", "mean_speed")
-        for name, value in self.fixed.items():
-            if name not in known:
-                raise UnknownNameError("quantity", name, known)
-            if not (is_number(value) and isfinite(value)):
-                raise ParameterError(f"{name} = {shortened(value)} is not usable", "give a number")
-            if name in ("mean_speed", "speed") and value < 0:
-                raise ParameterError(f"{name} = {value:g} is backward", "give 0 or more")
-        parameters = model.parameter_names[: -len(ANGLES)]
-        for name in self.free:
-            if name not in parameters:
-                raise UnknownNameError("parameter", name, parameters)
-        if self.symmetric:
-            self._check_symmetry()
-
-    def _check_symmetry(self) -> None:
-        model, reversal = self.model, self.system.reversal
-        if not (reversal and model.alike):
-            reason = "its ends differ" if reversal else "it has dampers or actuators"
-            raise ParameterError(
-                f"'{model.name}' has no symmetric gaits, as {reason}",
-                "look for general ones, or make both ends alike, without dampers and thrust",
-            )
-        for name in self.fixed:
-            if name in self.system.section.coordinates and name not in reversal.coordinates:
-                raise ParameterError(
-                    f"symmetry decides '{name}' already", "leave it, or look for general gaits"
-                )
-        for name in self.free:
-            if set(name.split(".")) & {*SIDES}:
-                raise ParameterError(
-                    f"'{name}' would make the ends differ", "look for general gaits"
-                )
 
     def _count(self, name: str, given: float) -> ParameterScale:
         """How a free parameter is counted."""

@@ -86,9 +86,11 @@ def stride_map(
 ) -> ReturnMap:
     """Run from the model's apex to the next and differentiate, gait or not.
 
-    ``parameters`` by dotted name, ``touchdown.fore`` and ``touchdown.hind`` among them; columns are
-    apex coordinates in the order of ``model.apex`` and then these. SI and radians. Raises
-    `UnknownNameError`, and `ParameterError` for a run that does not come back.
+    ``strides`` apexes further, if it is not the next. ``parameters`` by dotted name,
+    ``touchdown.fore`` and ``touchdown.hind`` among them; columns are apex coordinates in the order
+    of ``model.apex`` and then these. SI and radians. ``tolerance`` is the integrator's. Exact, by
+    variational equations and saltation (Leine & Nijmeijer 2004). Raises `UnknownNameError`, and
+    `ParameterError` for a run that does not come back.
     """
     model.on_flat_ground("the derivative of a stride")
     names = model.parameter_names

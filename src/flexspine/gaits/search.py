@@ -16,8 +16,8 @@ from flexspine.gaits.starts import Sampler
 from flexspine.hybrid.compile import Array
 from flexspine.models.legs import SIDES
 from flexspine.models.model import Model
-from flexspine.models.simulation import DEFAULT_TOLERANCE
-from flexspine.parameters import is_number, values
+from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
+from flexspine.parameters import check_seed, is_number, values
 
 # Natural units; gaits closer than this are one.
 DISTINCT = 1e-6
@@ -41,11 +41,11 @@ OTHER = "look at the outcome of a run near these values"
 
 @dataclass(frozen=True)
 class Search:
-    """What a search has found: distinct gaits, and how each start fared.
+    """What a search has found: a sequence of distinct gaits, and how each start fared.
 
-    ``tally`` counts starts by ``found`` or the reason that there is nothing: ``fell``, ``no_apex``
-    and other outcomes, ``stalled``, ``left_bounds``, ``refuted``. ``dropped`` counts drawn points
-    by the outcome that made them no starts at all.
+    ``gaits`` are symmetric ones first. ``tally`` counts starts by ``found`` or the reason that
+    there is nothing: ``fell``, ``no_apex`` and other outcomes, ``stalled``, ``left_bounds``,
+    ``refuted``. ``dropped`` counts drawn points by the outcome that made them no starts at all.
     """
 
     gaits: tuple[Gait, ...]
@@ -83,7 +83,7 @@ def find_gaits(
     seed: int = 0,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] | None = None,
 ) -> Search:
     """Find all gaits of a model with some quantities fixed, from seeded random starts.
 
@@ -92,9 +92,10 @@ def find_gaits(
     angles are unknown. Without it, energy, height and mean speed are those of the model's own
     gait. ``free`` are parameters that become unknown too, with the range to start in. A
     ``symmetric`` gait is its own mirror image in time; None looks for symmetric and general ones.
-    ``bounds`` narrow or widen where unknowns may lie. SI and radians. The same seed finds the same
-    gaits. Raises `UnknownNameError`, and `ParameterError` where the fixed quantities do not
-    single out isolated gaits.
+    ``starts`` of them are drawn for either kind. ``bounds`` narrow or widen where unknowns may lie,
+    low and high by name. SI and radians. The same seed finds the same gaits. ``progress`` is told
+    the share that is done, 0 to 1. Raises `UnknownNameError`, and `ParameterError` where the fixed
+    quantities do not single out isolated gaits.
     """
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
     ranges = {**(bounds or {}), **(free or {})}
@@ -109,7 +110,8 @@ def find_gaits(
         sampler = Sampler(problem, np.random.default_rng(seed), ranges)
         for count in range(starts):
             _try(problem, sampler, found, tally)
-            progress((number + (count + 1) / starts) / len(problems))
+            if progress is not None:
+                progress((number + (count + 1) / starts) / len(problems))
         dropped.update(sampler.dropped)
     found.sort(key=lambda gait: (not gait.symmetric, gait.family, gait.model.touchdown["fore"]))
     return Search(tuple(found), dict(tally), dict(dropped))
@@ -158,11 +160,8 @@ def _check_request(
             raise ParameterError(
                 f"'{name}' from {low:g} to {high:g} would vanish", "give a range above zero"
             )
-    for name, count, least in (("starts", starts, 1), ("seed", seed, 0)):
-        if not (isinstance(count, int) and count >= least):
-            raise ParameterError(
-                f"{name} = {count} is not usable", f"give a whole number from {least} on"
-            )
+    check_count("starts", starts)
+    check_seed(seed)
 
 
 def _counted(counts: Mapping[str, int]) -> str:

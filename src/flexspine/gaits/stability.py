@@ -28,8 +28,10 @@ class Stability:
     ``jacobian`` (d, d) maps a deviation of the apex to that one period later, SI units, in the
     order of ``coordinates``. ``multipliers`` (d,) are its eigenvalues, largest first, ``vectors``
     (d, d) the eigenvectors as columns and ``condition_numbers`` (d,) theirs, both in natural units
-    (``scales``), so that they do not depend on units. ``energy_identity`` is
-    ``|grad E' DP - grad E'| / |grad E|``, None if energy is not conserved.
+    (``scales``, SI), so that they do not depend on units. ``jacobian_error`` bounds the error of
+    the Jacobian in natural units. ``energy_gradient`` (d,) is that of the energy at the apex,
+    ``energy_identity`` is ``|grad E' DP - grad E'| / |grad E|``; both None if energy is not
+    conserved. ``crossing_rates`` tell how fast each guard was crossed, in its unit per second.
     """
 
     coordinates: tuple[str, ...]
@@ -79,7 +81,10 @@ class Stability:
         return self.level_spectral_radius < 1
 
     def shares(self, index: int) -> dict[str, float]:
-        """How much each coordinate takes part in a multiplier's eigenvector, largest first."""
+        """Return how much each coordinate takes part in an eigenvector, largest first.
+
+        ``index`` is that of the multiplier; shares add up to 1.
+        """
         sizes = np.abs(self.vectors[:, index]) ** 2
         pairs = zip(self.coordinates, (sizes / sizes.sum()).tolist(), strict=True)
         return dict(sorted(pairs, key=lambda pair: -pair[1]))
@@ -88,8 +93,9 @@ class Stability:
 def floquet_multipliers(gait: Gait, linear: ReturnMap | None = None) -> Stability:
     """Linearise the stride map of a gait exactly and take its eigenvalues.
 
-    Variational equations between events, saltation at them. Touchdown angles are held fixed.
-    ``linear`` spares linearising its trajectory anew. Raises `ParameterError` for what is no gait.
+    Variational equations between events, saltation at them (Leine & Nijmeijer 2004). Touchdown
+    angles are held fixed. ``linear`` spares linearising its trajectory anew. Raises
+    `ParameterError` for what is no gait.
     """
     if gait.flaw is not None:
         raise ParameterError(

@@ -9,9 +9,10 @@ from math import asin, inf, pi, sqrt
 import numpy as np
 
 from flexspine.errors import ParameterError
-from flexspine.gaits.problem import ANGLES, Problem
+from flexspine.gaits.problem import Problem
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.functions import section_quantities
+from flexspine.models.legs import ANGLES
 from flexspine.parameters import values
 
 # rad; pitches of a bounding animal at its apex.

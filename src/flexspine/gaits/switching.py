@@ -27,7 +27,7 @@ DOUBLED = 1e-6
 def switch_branch(family: Family, landmark: Landmark) -> list[Gait]:
     """Return a gait on either side of ``landmark`` on the branch that crosses there.
 
-    ``family`` is that of the branch with the landmark, which is a ``symmetry breaking``, a
+    ``family`` is that of the `Branch` with the landmark, which is a ``symmetry breaking``, a
     ``branch point`` or a ``period doubling``; the gaits of the last one repeat after twice as many
     strides. Fewer than two where the other branch does not go on. Raises `ParameterError` for
     another kind of landmark.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexspine.hybrid.compile import Array, CompiledMode
-from flexspine.hybrid.integrate import CHATTER_EVENTS, RECENT_EVENTS, Firing
+from flexspine.hybrid.events import CHATTER_EVENTS, RECENT_EVENTS, Firing
 from flexspine.hybrid.step_events import Indices
 
 

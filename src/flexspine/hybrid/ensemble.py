@@ -14,16 +14,11 @@ import heyoka as hy
 import numpy as np
 
 from flexspine.hybrid.batch import NONE, Ends, Starts
-from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array
 from flexspine.hybrid.crowds import Crowds
-from flexspine.hybrid.integrate import (
-    CLOSE,
-    MAX_STEPS,
-    SECTION_TIMEOUT,
-    SIMULTANEITY,
-    Firing,
-    integrate,
-)
+from flexspine.hybrid.events import CLOSE, SIMULTANEITY, Firing
+from flexspine.hybrid.integrate import MAX_STEPS, SECTION_TIMEOUT, integrate
 from flexspine.hybrid.lanes import LaneMode, LaneSystem
 from flexspine.hybrid.outcome import COMPLETED, OutcomeKind
 from flexspine.hybrid.step_events import NOTHING, Flags, Indices, Outlook

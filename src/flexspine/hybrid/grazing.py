@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexspine.hybrid.compile import Array, BoundMode
+from flexspine.hybrid.bound import BoundMode
+from flexspine.hybrid.compile import Array
 from flexspine.hybrid.trajectory import Arc
 
 # Guard units; a dip this deep is crossed at about the grazing rate when the guard's second

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OutcomeKind:
-    """A way for a run to end; ``advice`` tells what to try next."""
+    """A way for a run to end: its name, and ``advice`` on what to try next."""
 
     name: str
     advice: str
@@ -36,7 +36,11 @@ DIVERGED = OutcomeKind(
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a run: its kind and one line about what happened, where and when."""
+    """How a run ended: its kind, and one line about what happened, where and when.
+
+    Kinds of all runs are ``completed``, ``grazed``, ``chattered``, ``timed_out`` and ``diverged``;
+    animals add their own, such as ``fell`` and ``no_apex``.
+    """
 
     kind: OutcomeKind
     message: str

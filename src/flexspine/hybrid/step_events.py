@@ -14,6 +14,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
+from flexspine.hybrid.branchless import cubic_root, horner, larger, negated
 from flexspine.hybrid.compile import (
     Array,
     CompiledMode,
@@ -21,8 +22,8 @@ from flexspine.hybrid.compile import (
     Jump,
     compile_expressions,
 )
+from flexspine.hybrid.events import GRAZING_RATE, SIMULTANEITY, ZERO
 from flexspine.hybrid.grazing import GRAZING_DEPTH
-from flexspine.hybrid.integrate import GRAZING_RATE, SIMULTANEITY, ZERO
 from flexspine.hybrid.system import Guard, Mode
 
 Indices = NDArray[np.intp]
@@ -35,14 +36,8 @@ LOCATED = SIMULTANEITY / 10
 # out of the ordinary.
 ITERATIONS = 3
 
-# Iterations on the cubic that fits a guard at both ends of a step; it is a first guess only.
-GUESSES = 4
-
 # In place of a guard's position.
 NOTHING = -1.0
-
-# A share of the step that is none.
-NEVER = 2.0
 
 
 class Screening(NamedTuple):
@@ -141,7 +136,7 @@ class StepEvents:
             g0, r0 = self._guards[2 * row : 2 * row + 2]
             g1, r1 = later[2 * row : 2 * row + 2]
             armed, above = _armed(g0, r0, requires), hy.gt(g1, _margin(r1, 0.0))
-            falls = hy.logical_and([armed, _not(above)])
+            falls = hy.logical_and([armed, negated(above)])
             falling += falls
             which = hy.select(falls, hy.expression(float(row)), which)
             own = (g0, r0 * length, g1, r1 * length)
@@ -157,7 +152,7 @@ class StepEvents:
             # A step ends before it comes so close, so that the next one sees it turn.
             doubt += hy.logical_and([*dips, hy.lte(r1, 0.0), hy.lte(g1, depth)])
             if not requires:
-                humps = [_not(armed), _not(above), hy.gt(r0, 0.0), hy.lt(r1, 0.0)]
+                humps = [negated(armed), negated(above), hy.gt(r0, 0.0), hy.lt(r1, 0.0)]
                 doubt += hy.logical_and([*humps, hy.gte(left, 0.0), hy.gte(right, 0.0)])
         rates = self._tracked[1::2]
         for before, after in zip(rates, self._at(rates, end), strict=True):
@@ -167,8 +162,8 @@ class StepEvents:
         # Which of several falls first is seen in shorter steps.
         doubt += hy.gt(falling, 1.0)
         size = hy.sum([state**2.0 for state in end]) + length
-        lost = _not(hy.lt(size, np.inf))
-        answer = [guard, _cubic_root(*values), lost, doubt, top, soon]
+        lost = negated(hy.lt(size, np.inf))
+        answer = [guard, cubic_root(*values), lost, doubt, top, soon]
         return compile_expressions(answer, [*self._states, *end, length])
 
     def _compile_look(self, compiled: CompiledSystem, order: int) -> Any:
@@ -177,10 +172,10 @@ class StepEvents:
         given, which = hy.expression("time"), hy.expression("which")
         time, change = given, hy.expression(0.0)
         for _ in range(ITERATIONS):
-            value, rate = self._chosen(which, self._at(self._guards, _horner(series, time)))
+            value, rate = self._chosen(which, self._at(self._guards, horner(series, time)))
             change = value / rate
             time = time - change
-        states = _horner(series, time)
+        states = horner(series, time)
         begin, now = [row[0] for row in series], self._at(self._guards, states)
         odd = self._odd(which, time, change, self._at(self._guards, begin), now)
         after, further = self._jumped(compiled, which, states)
@@ -202,11 +197,11 @@ class StepEvents:
     def _odd(self, which: Any, time: Any, change: Any, before: list[Any], now: list[Any]) -> Any:
         """Whether an event is not located, grazes, or another guard fires with it or before it."""
         _, rate = self._chosen(which, now)
-        odd = _not(hy.gte(time, 0.0)) + hy.gt(rate, -GRAZING_RATE)
-        odd += _not(hy.lte(change**2.0, LOCATED**2))
+        odd = negated(hy.gte(time, 0.0)) + hy.gt(rate, -GRAZING_RATE)
+        odd += negated(hy.lte(change**2.0, LOCATED**2))
         for row, requires in self._wanted.items():
             armed = _armed(before[2 * row], before[2 * row + 1], requires)
-            due = _not(hy.gt(now[2 * row], _margin(now[2 * row + 1], 0.0)))
+            due = negated(hy.gt(now[2 * row], _margin(now[2 * row + 1], 0.0)))
             odd += hy.logical_and([armed, due, hy.neq(which, float(row))])
         return odd
 
@@ -229,7 +224,7 @@ class StepEvents:
         """The largest tracked values up to a time, from the tops of cubics, corrected twice."""
         first, last = (
             self._at(self._tracked, begin),
-            self._at(self._tracked, _horner(series, length)),
+            self._at(self._tracked, horner(series, length)),
         )
         results = []
         for i in range(0, len(first), 2):
@@ -243,15 +238,15 @@ class StepEvents:
             root = hy.sqrt(middle**2.0 - 4.0 * bend * start)
             guess = 2.0 * start / (root - middle) * length
             curve = -root / length**2.0
-            rate = self._at(self._tracked, _horner(series, guess))[i + 1]
+            rate = self._at(self._tracked, horner(series, guess))[i + 1]
             time = guess - rate / curve
-            value, left = self._at(self._tracked, _horner(series, time))[i : i + 2]
+            value, left = self._at(self._tracked, horner(series, time))[i : i + 2]
             moved = time - guess
             # What is left is of second order; at a hair's breadth the cubic's curve will do.
             curve = hy.select(hy.eq(moved, 0.0), curve, (left - rate) / moved)
-            highest, larger = value - left**2.0 / (2.0 * curve), _larger(f0, f1)
-            inside = hy.logical_and([hy.gt(r0, 0.0), hy.lt(r1, 0.0), hy.gt(highest, larger)])
-            results.append(hy.select(inside, highest, larger))
+            highest, at_ends = value - left**2.0 / (2.0 * curve), larger(f0, f1)
+            inside = hy.logical_and([hy.gt(r0, 0.0), hy.lt(r1, 0.0), hy.gt(highest, at_ends)])
+            results.append(hy.select(inside, highest, at_ends))
         return results
 
     def _entering(
@@ -264,7 +259,7 @@ class StepEvents:
             here = hy.eq(which, float(row))
             values = self._at(compiled.values_after(mode, guard, changed), states)
             for i, value in zip(changed, values, strict=True):
-                largest[i] = hy.select(here, _larger(largest[i], value), largest[i])
+                largest[i] = hy.select(here, larger(largest[i], value), largest[i])
         return list(largest.values())
 
     @cached_property
@@ -300,14 +295,6 @@ def _due(pairs: list[Any], jump: Jump) -> Any:
     return hy.gt(found, 0.0)
 
 
-def _not(condition: Any) -> Any:
-    return 1.0 - condition
-
-
-def _larger(one: Any, other: Any) -> Any:
-    return hy.select(hy.gt(one, other), one, other)
-
-
 def _margin(rate: Any, otherwise: float) -> Any:
     """How far above zero a guard is at most that falls to it in no time."""
     return hy.select(hy.lt(rate, 0.0), -SIMULTANEITY * rate, hy.expression(otherwise))
@@ -321,31 +308,3 @@ def _armed(value: Any, rate: Any, requires: list[tuple[int, float]]) -> Any:
 def _held(requires: list[tuple[int, float]]) -> list[Any]:
     """Whether held variables are as required."""
     return [hy.eq(hy.par[place], wanted) for place, wanted in requires]
-
-
-def _cubic_root(g0: Any, r0: Any, g1: Any, r1: Any) -> Any:
-    """Where a guard that falls below zero does so, as a share of the step, roughly.
-
-    Newton's iteration on the cubic through values and rates at both ends, from the right end,
-    where it is below zero for sure.
-    """
-    square, cube = 3.0 * (g1 - g0) - 2.0 * r0 - r1, 2.0 * (g0 - g1) + r0 + r1
-    share = hy.expression(1.0)
-    for _ in range(GUESSES):
-        value = g0 + share * (r0 + share * (square + share * cube))
-        slope = r0 + share * (2.0 * square + 3.0 * share * cube)
-        share = share - value / slope
-        share = hy.select(hy.gt(share, 0.0), share, hy.expression(0.0))
-        share = hy.select(hy.lt(share, 1.0), share, hy.expression(1.0))
-    return share
-
-
-def _horner(series: list[list[Any]], time: Any) -> list[Any]:
-    """The values of Taylor series at a time."""
-    values = []
-    for coefficients in series:
-        value = coefficients[-1]
-        for coefficient in reversed(coefficients[:-1]):
-            value = value * time + coefficient
-        values.append(value)
-    return values

@@ -17,7 +17,7 @@ import sympy as sp
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
-    from flexspine.hybrid.compile import BoundSystem
+    from flexspine.hybrid.bound import BoundSystem
     from flexspine.hybrid.trajectory import HybridState
 
 # From where a guard fired to where the run goes on, or how it ends; None: nothing happens.
@@ -137,7 +137,7 @@ class HybridSystem:
     reversal: Reversal | None = None
     tracked: tuple[str, ...] = ()
     large: bool = False
-    chatter_window: float = 1e-2  # no gait comes near it
+    chatter_window: float = 1e-2  # s; no gait comes near it
 
     @cached_property
     def places(self) -> dict[sp.Symbol, int]:

@@ -17,9 +17,10 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import Array, CompiledSystem, compile_expressions
+from flexspine.hybrid.compile import CompiledSystem, compile_expressions
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.system import Guard, Mode
 
@@ -40,7 +41,7 @@ class TangentFlow:
     held: slice
     deviations: slice
     folded: slice
-    rows: Array
+    rows: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,8 @@ class TangentCode:
         )
         # Code that needs few numbers may not reach as far as all held variables.
         reach = len(integrator.pars)
-        rows = np.array([*range(n, n + m), *(n + m + i for i in moved)])[: max(reach - m, 0)]
+        rows = np.array([*range(n, n + m), *(n + m + i for i in moved)], dtype=np.int64)
+        rows = rows[: max(reach - m, 0)]
         return TangentFlow(
             integrator,
             self.compiled.coefficients(lower.coefficients),

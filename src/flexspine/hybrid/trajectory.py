@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexspine.hybrid.compile import Array, BoundSystem
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array
 from flexspine.hybrid.outcome import Outcome
 
 

@@ -39,6 +39,11 @@ class Contact(Enum):
     SLIDE_BACK = "slide back"
 
 
+# In the order in which they are looked for.
+CONTACTS = (Contact.STICK, Contact.SLIDE_FORWARD, Contact.SLIDE_BACK, Contact.OPEN)
+STICK, FORWARD, BACK, OPEN = range(4)
+
+
 class Verdict(Enum):
     """How many solutions there are."""
 
@@ -71,13 +76,12 @@ def resolve(
 ) -> Resolution:
     """Find what touching feet do, sticking first.
 
-    Without ``count`` the first answer will do in which pushes are determined: of feet on one link
-    that stand still not all stick then, some slide at no speed.
-
     ``response`` is ``W`` (2k, 2k), ``before`` the feet's motion without pushes (2k,), x and y in
     turn. ``friction`` None: feet that touch do not slide. ``moving`` names the feet that slide
     already, so that friction has its direction (None: at rest). Where feet cannot be pushed
-    independently, as those at both ends of one link, pushes are the least ones.
+    independently, as those at both ends of one link, pushes are the least ones. Without ``count``
+    the first answer will do in which pushes are determined: of feet on one link that stand still
+    not all stick then, some slide at no speed.
     """
     feet = len(before) // 2
     combinations = _combinations(tuple(moving or (None,) * feet), friction is not None)
@@ -113,11 +117,6 @@ def resolve(
         pushes=pushes[chosen].reshape(-1, 2),
         solutions=len(distinct),
     )
-
-
-# In the order in which they are looked for.
-CONTACTS = (Contact.STICK, Contact.SLIDE_FORWARD, Contact.SLIDE_BACK, Contact.OPEN)
-STICK, FORWARD, BACK, OPEN = range(4)
 
 
 @lru_cache(maxsize=256)

@@ -124,6 +124,15 @@ class Linkage:
         masses, arms = zip(*points, strict=True)
         return np.array(masses), np.array(arms)
 
+    def with_feet(self, link: str) -> tuple[float, float, float]:
+        """Mass of a link with its feet, their centre from its start, and inertia about that."""
+        body = self.links[self.place[link]]
+        parts = [(body.mass, body.com, body.inertia)]
+        parts += [(foot.mass, foot.at, 0.0) for foot in self.feet if foot.link == link]
+        mass = sum(part for part, _, _ in parts)
+        com = sum(part * at for part, at, _ in parts) / mass
+        return mass, com, sum(own + part * (at - com) ** 2 for part, at, own in parts)
+
     @cached_property
     def mass(self) -> float:
         """The whole mass, in kg."""
@@ -261,13 +270,13 @@ class Linkage:
         return found
 
     def kinetic_energy(self, q: Array, rates: Array) -> Array:
-        """In J, shape (...)."""
+        """Kinetic energy in J, shape (...)."""
         momentum = (self.mass_matrix(q) @ rates[..., None])[..., 0]
         energy: Array = (rates * momentum).sum(axis=-1) / 2
         return energy
 
     def potential_energy(self, q: Array) -> Array:
-        """Of weight, zero at height zero, and of springs, in J, shape (...)."""
+        """Energy of weight, zero at height zero, and of springs, in J, shape (...)."""
         energy: Array = self.mass * self.gravity * self.com(q)[..., 1]
         for joint in self.joints:
             bend = q[..., self.place[joint.name]] - joint.rest

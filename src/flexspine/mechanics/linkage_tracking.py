@@ -48,70 +48,95 @@ def follow(
     if 2 * len(feet) > count:
         raise ValueError(f"{len(feet)} feet hold what the motors are to move")
     definitions = dict(motion.definitions)
+    given = _given(linkage, wanted, definitions)
+    matrix, applied = motion.mass_matrix(), motion.forces({})
+    left = [applied[i] - dot(matrix.row(i), given) for i in range(len(given))]
+    order = list(range(count))[::-1]  # the base first, which couples to all the same way
+    shares = [free[p] for p in order]
+    rows, bias = motion.foot_rows([foot.name for foot in feet])
+    held = [[sp.Add(*(rows[r, a] for a in share)) for share in shares] for r in range(rows.rows)]
+    closeness = _closeness(held, order)
+    if closeness == 0:
+        raise ValueError("2 feet at one hip hold what the motors are to move")
+    small = sp.Matrix(
+        count,
+        count,
+        lambda i, j: sp.Add(*(matrix[a, b] for a in shares[i] for b in shares[j])),
+    )
+    columns = [[sp.Add(*(left[a] for a in share)) for share in shares], *held]
+    more, (alone, *spread) = solve(small, columns, "law_")
+    definitions |= more
+    settling = [part for foot in feet for part in motion.settling(foot)]
+    needed = [
+        settling[r] - bias[r] - dot(rows.row(r), given) - dot(held[r], alone)
+        for r in range(rows.rows)
+    ]
+    sizes: Sequence[sp.Expr] = ()
+    if feet:
+        response = sp.Matrix(len(held), len(held), lambda i, j: dot(held[i], spread[j]))
+        more, (sizes,) = solve(response, [needed], "law_feet_")
+        definitions |= more
+    shared = [
+        (share, sp.Add(alone[i], *(spread[r][i] * sizes[r] for r in range(len(held)))))
+        for i, share in enumerate(shares)
+    ]
+    accelerations = _accelerations(motion, given, shared, definitions)
+    missing = [
+        dot(matrix.row(i), accelerations) - applied[i] - dot(rows.col(i), sizes)
+        for i in range(len(linkage.links))
+    ]
+    torques = _torques(linkage, wanted, missing, definitions)
+    forces = {foot.name: (sizes[2 * i], sizes[2 * i + 1]) for i, foot in enumerate(feet)}
+    return TrackedMotion(definitions, accelerations, forces, torques, closeness)
+
+
+def _given(
+    linkage: Linkage, wanted: Mapping[str, sp.Expr], definitions: dict[sp.Symbol, sp.Expr]
+) -> list[sp.Expr]:
+    """Accelerations of all coordinates from the motors alone; adds their definitions."""
     given: list[sp.Expr] = []
     for number, link in enumerate(linkage.links):
         driven = [wanted[name] for name in _on_the_way(linkage, number) if name in wanted]
         symbol = sp.Symbol(f"law_given_{link.name}", real=True)
         definitions[symbol] = sp.Add(*driven)
         given.append(symbol if driven else sp.S.Zero)
-    given += [sp.S.Zero, sp.S.Zero]
-    matrix, applied = motion.mass_matrix(), motion.forces({})
-    size = len(given)
-    left = [applied[i] - dot(matrix.row(i), given) for i in range(size)]
-    order = list(range(count))[::-1]  # the base first, which couples to all the same way
-    shares = [free[p] for p in order]
-    small = sp.Matrix(
-        count,
-        count,
-        lambda i, j: sp.Add(*(matrix[a, b] for a in shares[i] for b in shares[j])),
-    )
-    rows, bias = motion.foot_rows([foot.name for foot in feet])
-    held = [[sp.Add(*(rows[r, a] for a in share)) for share in shares] for r in range(rows.rows)]
-    closeness = _closeness(held, order)
-    if closeness == 0:
-        raise ValueError("2 feet at one hip hold what the motors are to move")
-    columns = [[sp.Add(*(left[a] for a in share)) for share in shares], *held]
-    more, (alone, *spread) = solve(small, columns, "law_")
-    definitions |= more
-    needed = []
-    for number, foot in enumerate(feet):
-        settling = motion.settling(foot)
-        for axis in range(2):
-            r = 2 * number + axis
-            course = dot(rows.row(r), given)
-            needed.append(settling[axis] - bias[r] - course - dot(held[r], alone))
-    sizes: Sequence[sp.Expr] = ()
-    if feet:
-        response = sp.Matrix(len(held), len(held), lambda i, j: dot(held[i], spread[j]))
-        more, (sizes,) = solve(response, [needed], "law_feet_")
-        definitions |= more
-    moves = [
-        sp.Add(alone[i], *(spread[r][i] * sizes[r] for r in range(len(held)))) for i in range(count)
-    ]
-    accelerations: list[sp.Expr] = []
+    return [*given, sp.S.Zero, sp.S.Zero]
+
+
+def _accelerations(
+    motion: LinkageMotion,
+    given: Sequence[sp.Expr],
+    shared: Sequence[tuple[list[int], sp.Expr]],
+    definitions: dict[sp.Symbol, sp.Expr],
+) -> list[sp.Expr]:
+    """Accelerations of all coordinates, those without motor included; adds their definitions."""
+    found: list[sp.Expr] = []
     for number, coordinate in enumerate(motion.coordinates):
         symbol = sp.Symbol(f"{coordinate.name}_wanted", real=True)
-        definitions[symbol] = sp.Add(
-            given[number],
-            *(move for move, share in zip(moves, shares, strict=True) if number in share),
-        )
-        accelerations.append(symbol)
-    missing: list[sp.Expr] = []
-    for i in range(len(linkage.links)):
-        symbol = sp.Symbol(f"law_missing_{linkage.links[i].name}", real=True)
-        definitions[symbol] = (
-            dot(matrix.row(i), accelerations) - applied[i] - dot(rows.col(i), sizes)
-        )
-        missing.append(symbol)
-    torques = {}
+        moves = (move for share, move in shared if number in share)
+        definitions[symbol] = sp.Add(given[number], *moves)
+        found.append(symbol)
+    return found
+
+
+def _torques(
+    linkage: Linkage,
+    wanted: Mapping[str, sp.Expr],
+    missing: Sequence[sp.Expr],
+    definitions: dict[sp.Symbol, sp.Expr],
+) -> dict[str, sp.Symbol]:
+    """Torques by joint from the moments that the links lack; adds their definitions."""
+    lacks: list[sp.Symbol] = []
+    for link, moment in zip(linkage.links, missing, strict=True):
+        symbol = sp.Symbol(f"law_missing_{link.name}", real=True)
+        definitions[symbol] = moment
+        lacks.append(symbol)
+    torques: dict[str, sp.Symbol] = {}
     for name in wanted:
-        symbol = sp.Symbol(f"torque_{name}", real=True)
-        definitions[symbol] = sp.Add(
-            *(missing[i] for i in range(len(linkage.links)) if name in _on_the_way(linkage, i))
-        )
-        torques[name] = symbol
-    forces = {foot.name: (sizes[2 * i], sizes[2 * i + 1]) for i, foot in enumerate(feet)}
-    return TrackedMotion(definitions, accelerations, forces, torques, closeness)
+        torques[name] = sp.Symbol(f"torque_{name}", real=True)
+        beyond = (lack for i, lack in enumerate(lacks) if name in _on_the_way(linkage, i))
+        definitions[torques[name]] = sp.Add(*beyond)
+    return torques
 
 
 def _free_columns(linkage: Linkage) -> list[list[int]]:

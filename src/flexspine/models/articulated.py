@@ -19,7 +19,7 @@ from functools import cached_property, lru_cache, partial
 
 import sympy as sp
 
-from flexspine.hybrid.compile import BoundSystem
+from flexspine.hybrid.bound import BoundSystem
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Guard, HybridSystem, Mode, Section
 from flexspine.hybrid.trajectory import HybridState

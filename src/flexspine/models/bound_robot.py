@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sympy as sp
 
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.mechanics.complementarity import Contact, Verdict

@@ -13,12 +13,14 @@ from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.hybrid.trajectory import Trajectory
 from flexspine.models.legs import PHASES, SIDES
+from flexspine.models.model import check_between
 from flexspine.models.simulation import Run
 from flexspine.parameters import values
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# s; between samples, where none is given.
 DEFAULT_INTERVAL = 1e-3
 
 # m; how much of the ground before and behind the run is kept.
@@ -109,10 +111,7 @@ def sample_times(trajectory: Trajectory, interval: float) -> Array:
 
 def check_interval(interval: float) -> None:
     """Raise `ParameterError` for a sampling interval (s) that no run can have."""
-    if not 0 < interval < inf:
-        raise ParameterError(
-            f"interval = {interval} is not usable", "give seconds above zero, such as 0.001"
-        )
+    check_between("interval", interval, 0, inf)
 
 
 def checked_times(trajectory: Trajectory, wanted: Array) -> Array:
@@ -156,10 +155,11 @@ def to_dataset(
 ) -> xr.Dataset:
     """Return the run as a Dataset over ``time`` (s), every ``interval`` seconds or at ``times``.
 
+    Variables tell their meaning and their unit; x forward, y up, pitch nose up positive.
     ``phase`` is one of DF, FS, HS, DS. Events stand along ``event`` with ``event_time`` and
-    ``event_kind``; ground that is not flat along ``ground``. Attributes carry units, parameters,
-    versions, tolerance and outcome. A run that ended at its first instant has one sample at most.
-    Raises `ParameterError`.
+    ``event_kind``; ground that is not flat along ``ground``. Attributes carry parameters, versions,
+    tolerance and outcome. A run that ended at its first instant has one sample at most. Raises
+    `ParameterError` for times that are not usable.
     """
     import xarray as xr
 

@@ -30,6 +30,9 @@ MOST_POINTS = 1_000_000
 # m, m/m; beyond these no height or slope means anything. What is steeper is a face.
 HIGHEST, STEEPEST_SLOPE = 1e3, 100.0
 
+# m; shorter or longer pieces and waves mean nothing either.
+SHORTEST, LONGEST = 1e-3, 1e6
+
 
 class Piece(NamedTuple):
     """Ground from ``start`` to ``end`` (m): a line of ``slope`` from height ``level`` (m) at the
@@ -47,8 +50,9 @@ class Piece(NamedTuple):
 class Ground:
     """Lines between ``points`` (x, y) in m, with slopes ``before`` and ``after`` beyond them.
 
-    Two points at the same x are a vertical face. From the last point on there may be a sinusoid of
-    ``amplitude`` and ``wavelength`` (m) besides. Raises `ParameterError`.
+    Two points at the same x are a vertical face. Slopes are in m/m, uphill positive. From the last
+    point on there may be a sinusoid of ``amplitude`` and ``wavelength`` (m) besides. ``name`` is
+    for people. Raises `ParameterError` for points that are out of order, too steep or too many.
     """
 
     name: str
@@ -74,7 +78,7 @@ class Ground:
         self._check_faces()
         _check("slope", self.before, -STEEPEST_SLOPE, STEEPEST_SLOPE)
         _check("slope", self.after, -STEEPEST_SLOPE, STEEPEST_SLOPE)
-        _check("wavelength", self.wavelength, 1e-3, 1e6)
+        _check("wavelength", self.wavelength, SHORTEST, LONGEST)
         steepest = STEEPEST_SLOPE / self.wave_number
         _check("amplitude", self.amplitude, -steepest, steepest)
 
@@ -102,22 +106,22 @@ class Ground:
 
     @property
     def wave_number(self) -> float:
-        """Of the sinusoid, in rad/m; it rises from zero at the last point."""
+        """Wave number of the sinusoid, in rad/m; it rises from zero at the last point."""
         return 2 * pi / self.wavelength
 
     def height(self, x: float, *, ahead: bool = True) -> float:
-        """Height at x in m; at a vertical face that of what lies ahead, or behind."""
+        """Return the height at x, in m; at a vertical face that of what lies ahead, or behind."""
         piece = self.piece(x, ahead=ahead)
         wave = piece.amplitude * sin(self.wave_number * (x - float(self.xs[-1])))
         return piece.level + piece.slope * (x - piece.start) + wave
 
     def heights(self, x: ArrayLike) -> Array:
-        """Heights at places x of any shape, in m."""
+        """Return the heights at places x of any shape, in m."""
         places = np.asarray(x, dtype=float)
         return np.array([self.height(float(each)) for each in places.ravel()]).reshape(places.shape)
 
     def piece(self, x: float, *, ahead: bool = True) -> Piece:
-        """The piece at x, or where two meet the one ahead or behind, as far as in sight."""
+        """Return the piece at x, or where two meet the one ahead or behind, as far as in sight."""
         xs, ys = self.xs, self.ys
         right = int(np.searchsorted(xs, x, side="right" if ahead else "left"))
         amplitude = 0.0
@@ -134,7 +138,7 @@ class Ground:
         return Piece(start, end, level, float(slope), amplitude)
 
     def top(self, x: float) -> float:
-        """The highest ground in sight of x, or a little more, in m."""
+        """Return the height of the highest ground in sight of x, or a little more, in m."""
         first = np.searchsorted(self.xs, x - SIGHT, side="left")
         last = np.searchsorted(self.xs, x + SIGHT, side="right")
         sides = ((x + way * SIGHT, ahead) for way in (-1, 1) for ahead in (True, False))
@@ -142,7 +146,7 @@ class Ground:
         return float(max(*ends, *self.ys[first:last])) + 2 * abs(self.amplitude)
 
     def outline(self, start: float, end: float) -> Array:
-        """Points (k, 2) along the ground from ``start`` to ``end`` in m, to draw it."""
+        """Return points (k, 2) along the ground from ``start`` to ``end`` in m, to draw it."""
         inner = (self.xs > start) & (self.xs < end)
         before = [(start, self.height(start))]
         after = [(end, self.height(end, ahead=False))]
@@ -154,7 +158,7 @@ class Ground:
 
     @classmethod
     def step(cls, height: float, at: float = BEGINS) -> Ground:
-        """One step up by ``height`` m (down if negative), its face at x = ``at``."""
+        """Make one step up by ``height`` m (down if negative), its face at x = ``at``."""
         _check("height", height, -HIGHEST, HIGHEST)
         return cls(f"step of {height:g} m", ((at, 0.0), (at, height)))
 
@@ -162,9 +166,9 @@ class Ground:
     def stairs(
         cls, height: float, length: float = 1.0, count: int = 5, at: float = BEGINS
     ) -> Ground:
-        """``count`` steps by ``height`` m, each ``length`` m after the one before."""
+        """Make ``count`` steps by ``height`` m, each ``length`` m after the one before."""
         _check("height", height, -HIGHEST, HIGHEST)
-        _check("length", length, 1e-3, 1e6)
+        _check("length", length, SHORTEST, LONGEST)
         _check("count", count, 1, MOST_POINTS / 2)
         if count != int(count):
             raise ParameterError(f"count = {count:g} of steps is not usable", "give a whole number")
@@ -175,22 +179,22 @@ class Ground:
 
     @classmethod
     def ramp(cls, height: float, length: float = 1.0, at: float = BEGINS) -> Ground:
-        """Up by ``height`` m over ``length`` m, and level again."""
+        """Make a ramp from x = ``at``: up by ``height`` m over ``length`` m, and level again."""
         _check("height", height, -HIGHEST, HIGHEST)
-        _check("length", length, 1e-3, 1e6)
+        _check("length", length, SHORTEST, LONGEST)
         return cls(f"ramp of {height:g} m over {length:g} m", ((at, 0.0), (at + length, height)))
 
     @classmethod
     def slope(cls, degrees: float, at: float = BEGINS) -> Ground:
-        """From x = ``at`` on uphill by ``degrees``, downhill if negative."""
+        """Make a slope from x = ``at`` on, uphill by ``degrees``, downhill if negative."""
         _check("angle", degrees, -80, 80)
         return cls(f"slope of {degrees:g} degrees", ((at, 0.0),), after=tan(radians(degrees)))
 
     @classmethod
     def waves(cls, amplitude: float, wavelength: float = 1.0, at: float = BEGINS) -> Ground:
-        """From x = ``at`` on a sinusoid."""
+        """Make a sinusoid from x = ``at`` on, of ``amplitude`` and ``wavelength`` in m."""
         _check("amplitude", amplitude, -HIGHEST, HIGHEST)
-        _check("wavelength", wavelength, 1e-3, 1e6)
+        _check("wavelength", wavelength, SHORTEST, LONGEST)
         name = f"waves of {amplitude:g} m, {wavelength:g} m long"
         return cls(name, ((at, 0.0),), amplitude=amplitude, wavelength=wavelength)
 
@@ -203,7 +207,11 @@ class Ground:
         seed: int = 0,
         at: float = BEGINS,
     ) -> Ground:
-        """Lines between heights drawn from -``height`` to ``height`` m, ``spacing`` m apart."""
+        """Make lines between heights drawn evenly up to ``height`` m, to either side of level.
+
+        They are ``spacing`` m apart, from x = ``at`` on over ``length`` m. The same seed draws the
+        same ground.
+        """
         heights = _drawn(height, spacing, length, seed)
         points = [(at, 0.0), *((at + spacing * (k + 1), y) for k, y in enumerate(heights))]
         name = f"rough ground of {height:g} m, {spacing:g} m apart, seed {seed}"
@@ -218,7 +226,11 @@ class Ground:
         seed: int = 0,
         at: float = BEGINS,
     ) -> Ground:
-        """Level blocks ``spacing`` m long, as high as drawn from -``height`` to ``height`` m."""
+        """Make level blocks, as high as drawn evenly up to ``height`` m, to either side of level.
+
+        They are ``spacing`` m long, from x = ``at`` on over ``length`` m. The same seed draws the
+        same ground.
+        """
         before, points = 0.0, []
         for k, y in enumerate(_drawn(height, spacing, length, seed)):
             points += [(at + spacing * k, before), (at + spacing * k, y)]
@@ -251,8 +263,8 @@ def _check(what: str, value: float, low: float, high: float) -> None:
 
 def _drawn(height: float, spacing: float, length: float, seed: int) -> list[float]:
     _check("height", height, 0, HIGHEST)
-    _check("spacing", spacing, 1e-3, 1e6)
-    _check("length", length, 0, 1e6)
+    _check("spacing", spacing, SHORTEST, LONGEST)
+    _check("length", length, 0, LONGEST)
     if spacing > length:
         raise ParameterError(
             f"spacing = {spacing:g} m is more than the ground is long, {length:.4g} m",

@@ -20,6 +20,9 @@ from flexspine.parameters import ParameterSet, quantity
 
 SIDES = ("fore", "hind")
 
+# The touchdown angles, as they are named among parameters.
+ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
+
 # Both legs in flight, fore stance, hind stance, both in stance.
 PHASES = ("DF", "FS", "HS", "DS")
 STANCE_PHASES = {"fore": ("FS", "DS"), "hind": ("HS", "DS")}

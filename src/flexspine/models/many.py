@@ -16,7 +16,7 @@ from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.ensemble import run_many
 from flexspine.hybrid.functions import section_quantities
 from flexspine.hybrid.lanes import compile_lanes
-from flexspine.models.legs import SIDES
+from flexspine.models.legs import ANGLES, SIDES
 from flexspine.models.model import LARGEST_START, TOLERANCES, Model, check_between
 from flexspine.models.simulation import DEFAULT_TOLERANCE, Run, check_count, simulate
 from flexspine.parameters import quantities, shortened, values
@@ -58,12 +58,13 @@ class Cases:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What came of many runs, in columns of shape (k,).
+    """What came of many runs, in ``columns`` of shape (k,), which ``ensemble[name]`` gives too.
 
     ``outcome`` is the name of each; ``strides`` completed; ``duration`` in s and ``distance`` in m
     to the end; ``apex_...`` and ``apex_time`` the last apex reached, or the start;
     ``peak_grf_...`` in N per pair of legs; ``energy_start`` and ``energy_end`` in J at the first
-    and the last apex; ``dissipated`` in J at the end.
+    and the last apex; ``dissipated`` in J at the end. ``cases`` are the model and what differed,
+    ``strides`` how many were asked for. A column that there is not raises `UnknownNameError`.
     """
 
     cases: Cases
@@ -89,7 +90,10 @@ class Ensemble:
         return dict(zip(names.tolist(), counts.tolist(), strict=True))
 
     def run(self, index: int) -> Run:
-        """Simulate one of the runs again, alone and with all that it leaves behind."""
+        """Simulate one of the runs again, alone and with all that it leaves behind.
+
+        Raises `ParameterError` for a number that no run has.
+        """
         if not -len(self) <= index < len(self):
             raise ParameterError(f"there is no run {index}", f"give 0 to {len(self) - 1}")
         return simulate(self.cases.one(index), strides=self.strides, tolerance=self.tolerance)
@@ -103,7 +107,7 @@ def simulate_many(
     strides: int = 1,
     tolerance: float = DEFAULT_TOLERANCE,
     processes: int = 1,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] | None = None,
 ) -> Ensemble:
     """Simulate ``strides`` strides of many animals at once, each from its own apex.
 
@@ -111,7 +115,8 @@ def simulate_many(
     ``touchdown.fore``, ``touchdown.hind``: numbers, or arrays of one value a run; what is not
     given is the model's. SI and radians. Events, outcomes and results are those of `simulate`,
     save that a body that starts in the ground has fallen there. ``processes`` share the work
-    without a change to the results. Raises `UnknownNameError` and `ParameterError`.
+    without a change to the results; ``progress`` is told the share that is done, 0 to 1. Raises
+    `UnknownNameError` and `ParameterError`.
     """
     for given in (states, parameters):
         if not (given is None or isinstance(given, Mapping)):
@@ -124,7 +129,8 @@ def simulate_many(
     workers = min(check_count("processes", processes), len(parts))
     for piece in _stream(map(cases.piece, parts), strides, tolerance, workers):
         pieces.append(piece.columns)
-        progress(len(pieces) / len(parts))
+        if progress is not None:
+            progress(len(pieces) / len(parts))
     columns = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
     return Ensemble(cases, strides, tolerance, columns)
 
@@ -137,10 +143,11 @@ def stream_many(
     tolerance: float = DEFAULT_TOLERANCE,
     processes: int = 1,
 ) -> Iterator[Ensemble]:
-    """Simulate batch after batch, each given as ``states`` and ``parameters`` of `simulate_many`.
+    """Simulate batch after batch, an `Ensemble` each.
 
-    Batches are taken as they are needed and given back in order, so that memory does not grow
-    with their number. Raises as `simulate_many`.
+    A batch maps names to values as ``states`` and ``parameters`` of `simulate_many` do. Batches are
+    taken as they are needed and given back in order, so that memory does not grow with their
+    number. Raises as `simulate_many`.
     """
     return _stream((make_cases(model, b) for b in batches), strides, tolerance, processes)
 
@@ -234,7 +241,7 @@ def _bounds(model: Model) -> dict[str, tuple[float, float, str]]:
     upright = np.nextafter(pi / 2, 0)
     angle = (-upright, upright, "give an angle from the vertical between -1.57 and 1.57 rad")
     bounds = dict.fromkeys(model.apex, any_number)
-    bounds |= {f"touchdown.{side}": angle for side in SIDES}
+    bounds |= dict.fromkeys(ANGLES, angle)
     for item in quantities(type(model.parameters)):
         low = np.nextafter(item.lower, np.inf) if item.lower_is_open else item.lower
         told = f"give a number in {item.told} ({item.meaning})"

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from flexspine.errors import ParameterError, UnknownNameError
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.system import HybridSystem
 from flexspine.hybrid.trajectory import HybridState
 from flexspine.models.actuation import ACTUATORS, BARE, HIP_LEVER, Features
 from flexspine.models.bounder import FORE, HIND, BounderKind, beneath, works
 from flexspine.models.ground import Ground
-from flexspine.models.legs import SIDES, phase_of
+from flexspine.models.legs import ANGLES, SIDES, phase_of
 from flexspine.models.underfoot import OnGround, begin
 from flexspine.parameters import ParameterSet, is_number, quantities, replaced, shortened, values
 
@@ -31,9 +32,10 @@ LARGEST_START = 1e6
 
 @dataclass(frozen=True)
 class Source:
-    """Where a model's numbers come from.
+    """Where the numbers of a model, a robot or a walk come from.
 
-    ``provenance`` tells it per dotted name where it differs from ``source``.
+    ``source`` tells it in short, ``citation`` in full; ``provenance`` tells it per dotted name
+    where it differs from ``source``. ``notes`` and ``doubts`` are sentences.
     """
 
     title: str
@@ -44,7 +46,7 @@ class Source:
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, name: str) -> str:
-        """Return where the value of ``name`` comes from."""
+        """Return where the value of a dotted name comes from."""
         return self.provenance.get(name, self.source)
 
     def attributes(self) -> dict[str, str]:
@@ -60,12 +62,14 @@ class Source:
 
 @dataclass(frozen=True)
 class Model:
-    """A bounder ready to run. All values in SI and radians.
+    """A bounder ready to run, as `load_model` makes it. All values in SI and radians.
 
-    ``apex`` is the start, by section coordinate; ``touchdown`` the angle of each leg from the
-    vertical at touchdown, foot ahead of the hip positive. ``kept`` are dampers and actuators
-    whose terms stay in the equations even where their numbers vanish. The apex height is above the
-    ``ground`` at x = 0, which is flat and at height 0 if none is given.
+    ``kind`` is what it is, with its equations; ``parameters`` are its numbers, in groups. ``apex``
+    is the start, by section coordinate; ``touchdown`` the angle of each leg (``fore``, ``hind``)
+    from the vertical at touchdown, foot ahead of the hip positive. ``source`` tells where numbers
+    come from. ``kept`` are dampers and actuators whose terms stay in the equations even where their
+    numbers vanish. The apex height is above the ``ground`` at x = 0, which is flat and at height 0
+    if none is given. Raises `UnknownNameError` and `ParameterError`.
     """
 
     name: str
@@ -106,7 +110,8 @@ class Model:
     ) -> Model:
         """Return the same model with some values changed, parameters by dotted name.
 
-        ``origin`` tells where they come from. Raises `UnknownNameError` and `ParameterError`.
+        ``apex`` is by section coordinate, ``touchdown`` by leg; what is not named stays. ``origin``
+        tells where they come from. Raises `UnknownNameError` and `ParameterError`.
         """
         changed = dict(parameters or {})
         names = [*changed, *(["apex"] if apex else []), *(["touchdown"] if touchdown else [])]
@@ -125,6 +130,15 @@ class Model:
     def renamed(self, name: str, source: Source) -> Model:
         """Return the same numbers under another name and origin."""
         return replace(self, name=name, source=source)
+
+    def record(self) -> dict[str, Any]:
+        """Return all that decides what it does on flat ground, as JSON holds it."""
+        return {
+            "model": self.kind.name,
+            "parameters": values(self.parameters),
+            "apex": dict(self.apex),
+            "touchdown": dict(self.touchdown),
+        }
 
     @cached_property
     def system(self) -> HybridSystem:
@@ -159,7 +173,7 @@ class Model:
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
-        """Public names of the states, in order."""
+        """Names of the states, in order, such as ``com_x`` and ``fore_pitch_rate``."""
         coordinates = ("com_x", "com_y", *self.kind.body(BARE).coordinates)
         rates = (f"{name}_rate" for name in coordinates)
         return (*coordinates, *rates, "dissipated_energy", *works(self.features))
@@ -167,7 +181,7 @@ class Model:
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Dotted names of ``system.parameters``, in order; the touchdown angles come last."""
-        return (*self.kind.body(BARE).parameters, *(f"touchdown.{side}" for side in SIDES))
+        return (*self.kind.body(BARE).parameters, *ANGLES)
 
     @cached_property
     def numbers(self) -> dict[str, float]:
@@ -195,7 +209,7 @@ class Model:
 
     @cached_property
     def mass(self) -> float:
-        """Of the whole body, in kg."""
+        """Mass of the whole body, in kg."""
         given = values(self.parameters)
         if "body.mass" in given:
             return given["body.mass"]
@@ -215,7 +229,7 @@ class Model:
         scales["energy"] = self.mass * gravity * length
         for name in self.system.section.coordinates:
             scales.setdefault(name, rate if name.endswith("_rate") else 1.0)
-        scales |= {f"touchdown.{side}": 1.0 for side in SIDES}
+        scales |= dict.fromkeys(ANGLES, 1.0)
         return scales | {
             name: length if name.endswith((".extension", f".{HIP_LEVER}")) else 1.0
             for name in ACTUATORS
@@ -249,7 +263,7 @@ class Model:
         return OnGround(compiled, self.parameter_vector, self.ground)
 
     def apex_state(self) -> HybridState:
-        """The start in flight, at the apex."""
+        """Return the start in flight, at the apex."""
         name_of = dict(zip(self.system.states, self.state_names, strict=True))
         section = self.system.section.coordinates
         start = {name_of[symbol]: self.apex[c] for c, symbol in section.items()}
@@ -260,9 +274,10 @@ class Model:
     def state(
         self, start: Mapping[str, float], toes: Mapping[str, float] | None = None
     ) -> HybridState:
-        """Any state, by state name (absent ones are zero); ``toes`` (m) are those on the ground.
+        """Return any state, by state name; absent ones are zero.
 
-        Raises `UnknownNameError` and `ParameterError`.
+        ``toes`` are the places x in m of those on the ground, by leg. Raises `UnknownNameError` and
+        `ParameterError`.
         """
         toes = toes or {}
         _check_numbers("state", {**dict.fromkeys(self.state_names, 0.0), **start}, self.state_names)

@@ -11,7 +11,8 @@ import numpy as np
 import sympy as sp
 
 from flexspine.errors import ParameterError, StateError
-from flexspine.hybrid.compile import Array, BoundSystem, compile_system
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, compile_system
 from flexspine.hybrid.integrate import integrate
 from flexspine.hybrid.outcome import TIMED_OUT
 from flexspine.hybrid.system import HybridSystem, Mode, Section

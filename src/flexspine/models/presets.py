@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from flexspine.errors import InputError, PresetError, UnknownNameError
+from flexspine.errors import InputError, PresetError
 from flexspine.models.model import Model, Source
 from flexspine.models.registry import find_kind
+from flexspine.models.toml_files import read_named, shipped_names
 from flexspine.parameters import build, flattened
+
+FOLDER = "presets"
 
 _TABLES = {"parameters", "apex", "touchdown", "provenance"}
 _TEXTS = {"model", "base", "title", "citation", "source"}
@@ -20,11 +21,7 @@ _LISTS = {"notes", "doubts"}
 
 def preset_names() -> list[str]:
     """Return the names of the presets that come with flexspine."""
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in (files("flexspine") / "presets").iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return shipped_names(FOLDER)
 
 
 def load_model(
@@ -36,9 +33,9 @@ def load_model(
 ) -> Model:
     """Load a preset by name, or a TOML file by path, with some values changed.
 
-    ``parameters`` by dotted name (``{"spine.stiffness": 240}``), ``apex`` by section coordinate,
-    ``touchdown`` by leg; SI and radians. Raises `UnknownNameError`, `PresetError`,
-    `ParameterError`.
+    ``parameters`` by dotted name (``{"spine.stiffness": 240}``), ``apex`` by section coordinate
+    such as ``height``, ``touchdown`` by leg (``fore``, ``hind``); SI and radians. Raises
+    `UnknownNameError`, `PresetError`, `ParameterError`.
     """
     model = _load(str(preset), ())
     return model.with_values(parameters, apex=apex, touchdown=touchdown)
@@ -48,7 +45,8 @@ def _load(name: str, users: tuple[str, ...]) -> Model:
     """Load a preset or a file; ``users`` are the files that are based on it."""
     if name in users:
         raise PresetError(f"'{name}' is its own base", "base it on a preset")
-    content = _parse(name, _read(name))
+    content = read_named(name, "preset", FOLDER)
+    _check_entries(name, content)
     try:
         return _model(name, content, users)
     except InputError as failure:
@@ -57,30 +55,7 @@ def _load(name: str, users: tuple[str, ...]) -> Model:
         raise PresetError(f"'{name}': {failure.message}", failure.remedy) from None
 
 
-def _read(preset: str) -> str:
-    if preset in preset_names():
-        resource = files("flexspine") / "presets" / f"{preset}.toml"
-        return resource.read_text(encoding="utf-8")
-    path = Path(preset)
-    try:
-        if path.suffix != ".toml" and not path.exists():
-            raise UnknownNameError("preset", preset, preset_names())
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as failure:
-        raise PresetError(
-            f"cannot read '{preset}' ({failure.strerror})", "give a readable TOML file"
-        ) from None
-    except UnicodeDecodeError:
-        raise PresetError(f"'{preset}' is not text", "give a TOML file in UTF-8") from None
-    except ValueError:
-        raise PresetError(f"{preset!r} is no file name", "give a readable TOML file") from None
-
-
-def _parse(name: str, text: str) -> dict[str, Any]:
-    try:
-        content = tomllib.loads(text)
-    except (ValueError, RecursionError) as failure:
-        raise PresetError(f"'{name}' is not valid TOML: {failure}", "mend that line") from None
+def _check_entries(name: str, content: Mapping[str, Any]) -> None:
     for key, value in content.items():
         if key not in _TABLES | _TEXTS | _LISTS:
             raise PresetError(
@@ -92,7 +67,6 @@ def _parse(name: str, text: str) -> dict[str, Any]:
         if not (isinstance(value, wanted) and texts):
             kind = {dict: "a table", str: "a text", list: "a list of texts"}[wanted]
             raise PresetError(f"'{name}': '{key}' is not {kind}", f"make it {kind}")
-    return content
 
 
 def _model(name: str, content: Mapping[str, Any], users: tuple[str, ...]) -> Model:

@@ -104,7 +104,7 @@ class Robot:
     ``parents`` by link, in the order of the coordinates; the first has none. ``joints`` by name:
     link and whether it has a motor. ``feet`` by name: link. ``numbers`` by dotted name, such as
     ``spine.stiffness``, in SI units and radians; those under ``space.`` are across the plane.
-    ``legs`` by name, for gaits.
+    ``legs`` by name, for gaits. ``source`` tells where numbers come from. `load_robot` makes one.
     """
 
     name: str
@@ -117,7 +117,7 @@ class Robot:
 
     @cached_property
     def linkage(self) -> Linkage:
-        """The mechanism."""
+        """The mechanism: kinematics and the terms of its equations of motion."""
         return Linkage(
             tuple(
                 Link(name=name, parent=parent, **self._of(name, LinkNumbers))
@@ -147,7 +147,7 @@ class Robot:
     def with_values(self, changes: Mapping[str, Any], origin: str = "set by user") -> Robot:
         """Return the same robot with some numbers changed, by dotted name.
 
-        Raises `UnknownNameError` and `ParameterError`.
+        ``origin`` tells where they come from. Raises `UnknownNameError` and `ParameterError`.
         """
         for name in changes:
             if name not in self.numbers:

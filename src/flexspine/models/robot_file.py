@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from flexspine.errors import InputError, PresetError, UnknownNameError
 from flexspine.models.model import Source
 from flexspine.models.robot import SPACE, LegParts, Robot, checked
+from flexspine.models.toml_files import read_named, shipped_names
 from flexspine.parameters import flattened
+
+FOLDER = "robots"
 
 TABLES = ("links", "joints", "feet")
 LEGS = "legs"
@@ -27,11 +28,7 @@ WORDS = {"links": ("parent",), "joints": ("link", "actuated"), "feet": ("link",)
 
 def robot_names() -> list[str]:
     """Return the names of the robots that come with flexspine."""
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in (files("flexspine") / "robots").iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return shipped_names(FOLDER)
 
 
 def load_robot(robot: str | Path, parameters: Mapping[str, Any] | None = None) -> Robot:
@@ -41,34 +38,16 @@ def load_robot(robot: str | Path, parameters: Mapping[str, Any] | None = None) -
     radians. Raises `UnknownNameError`, `PresetError` and `ParameterError`.
     """
     name = str(robot)
+    content = read_named(name, "robot", FOLDER)
     try:
-        made = _robot(Path(name).stem, _parsed(_read(name)), f"file {name}")
-    except UnknownNameError:
-        raise
+        _check_entries(content)
+        made = _robot(Path(name).stem, content, f"file {name}")
     except InputError as failure:
         raise PresetError(f"'{name}': {failure.message}", failure.remedy) from None
     return made.with_values(parameters) if parameters else made
 
 
-def _read(name: str) -> str:
-    if name in robot_names():
-        return (files("flexspine") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
-    path = Path(name)
-    try:
-        if path.suffix != ".toml" and not path.exists():
-            raise UnknownNameError("robot", name, robot_names())
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as failure:
-        raise InputError(f"cannot be read ({failure.strerror})", "give a TOML file") from None
-    except ValueError:
-        raise InputError("is not text", "give a TOML file in UTF-8") from None
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    try:
-        content = tomllib.loads(text)
-    except (ValueError, RecursionError) as failure:
-        raise InputError(f"not valid TOML: {failure}", "mend that line") from None
+def _check_entries(content: Mapping[str, Any]) -> None:
     known = (*TABLES, LEGS, SPACE, PROVENANCE, *TEXTS, *LISTS, *GROUND)
     for entry in content:
         if entry not in known:
@@ -83,7 +62,6 @@ def _parsed(text: str) -> dict[str, Any]:
         texts = content.get(entry, [])
         if not (isinstance(texts, list) and all(isinstance(text, str) for text in texts)):
             raise InputError(f"'{entry}' is not a list of texts", f'write {entry} = ["..."]')
-    return content
 
 
 def _table(content: Mapping[str, Any], name: str) -> Mapping[str, Any]:

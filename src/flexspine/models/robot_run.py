@@ -59,7 +59,11 @@ ROBOT_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
 
 @dataclass(frozen=True)
 class RobotRun:
-    """A simulated run of a robot. ``settings`` are what it was asked for."""
+    """A simulated run of a planar robot; `robot_dataset` gives every quantity of it over time.
+
+    ``bound`` is the robot with its controller, ``settings`` are what was asked for, ``tolerance``
+    is the integrator's.
+    """
 
     bound: BoundRobot
     trajectory: Trajectory
@@ -82,7 +86,10 @@ class RobotRun:
         return tuple(event for event in self.trajectory.events if event.names != (SAMPLE,))
 
     def impulses(self, event: Event) -> Array:
-        """The impulses on the feet at an event in N s, shape (feet, 2); zero if it was no hit."""
+        """Return the impulses on the feet at an event in N s, shape (feet, 2), x and y.
+
+        Zero if it was neither a touchdown nor a push.
+        """
         feet = self.robot.feet
         if not event.names[0].endswith(HITS):
             return np.zeros((len(feet), 2))
@@ -98,8 +105,8 @@ def robot_dataset(
     """Return the run over ``time`` (s), every ``interval`` seconds or at ``times``.
 
     Dimensions are ``joint``, ``motor``, ``link``, ``foot_name`` and ``axis`` (x, y), all by name;
-    `ROBOT_VARIABLES` tells what there is. ``footing`` names the feet on the ground. Events stand
-    along ``event`` with ``event_time``, ``event_kind`` and ``event_impulse`` (N s by foot and
+    variables tell their meaning and their unit. ``footing`` names the feet on the ground. Events
+    stand along ``event`` with ``event_time``, ``event_kind`` and ``event_impulse`` (N s by foot and
     axis). Attributes carry parameters, settings, versions, tolerance and outcome. A run that ended
     at its first instant has no samples. Raises `ParameterError` for times that are not usable.
     """

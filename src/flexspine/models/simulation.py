@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from numbers import Integral
 
 from flexspine.errors import ParameterError, StateError
-from flexspine.hybrid.compile import BoundSystem
-from flexspine.hybrid.integrate import MAX_STEPS, ZERO, integrate
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.events import ZERO
+from flexspine.hybrid.integrate import MAX_STEPS, integrate
 from flexspine.hybrid.outcome import Outcome
 from flexspine.hybrid.system import Arming
 from flexspine.hybrid.trajectory import HybridState, Trajectory
@@ -17,7 +17,7 @@ from flexspine.models.actuation import BARE
 from flexspine.models.bounder import beneath
 from flexspine.models.model import Model, check_between
 from flexspine.models.underfoot import OnGround, clearances
-from flexspine.parameters import is_number, shortened
+from flexspine.parameters import check_whole, shortened
 
 # Taylor truncation error per step; strides then repeat to some 1e-13.
 DEFAULT_TOLERANCE = 1e-12
@@ -28,7 +28,11 @@ MOST = 2**53
 
 @dataclass(frozen=True)
 class Run:
-    """A simulated run of a model: what was run, and what came of it."""
+    """A simulated run of a model; `to_dataset` gives every quantity of it over time.
+
+    ``trajectory`` has its arcs, events and crossings of the section; ``tolerance`` is the
+    integrator's.
+    """
 
     model: Model
     trajectory: Trajectory
@@ -46,7 +50,7 @@ class Run:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases in order: DF, FS, HS, DS."""
+        """The contact phases in order: DF (no leg stands), FS (fore), HS (hind), DS (both)."""
         return self.trajectory.modes
 
     @property
@@ -59,11 +63,11 @@ class Run:
 
     @property
     def apexes(self) -> list[dict[str, float]]:
-        """Section states by name, the start included if the run began at an apex."""
+        """The section coordinates of all apexes by name, SI; the start included if it is one."""
         return [self.section_state(point) for point in self.section_points]
 
     def section_state(self, point: HybridState) -> dict[str, float]:
-        """The section coordinates of a point, by name."""
+        """Return the section coordinates of a point, by name, SI."""
         system = self.model.system
         return {
             name: float(point.states[system.places[symbol]])
@@ -84,9 +88,10 @@ def simulate(
     """Simulate ``strides`` strides (default 1) or ``duration`` seconds.
 
     Starts at the model's apex, or at ``state`` by state name (absent ones zero) with the legs in
-    ``toes`` (toe position x in m) on the ground. ``tolerance`` is the integrator's, between 1e-17
-    and 1e-3; ``max_steps`` bounds the work of one stride. A run that falls or gets stuck is no
-    error: look at ``outcome``. Raises `ParameterError` and `StateError`.
+    ``toes`` (toe position x in m) on the ground; SI and radians. ``tolerance`` is the integrator's,
+    between 1e-17 and 1e-3; ``max_steps`` bounds the Taylor steps of one stride. A run that falls or
+    gets stuck is no error: look at ``outcome``. Raises `UnknownNameError`, `ParameterError`, and
+    `StateError` for a start in the ground or with a leg that would pull.
     """
     if strides is not None and duration is not None:
         raise ParameterError("both strides and duration are given", "give one of them")
@@ -113,14 +118,13 @@ def simulate(
 
 
 def check_count(name: str, value: int) -> int:
-    """Return a whole number from 1 on. Raises `ParameterError` for anything else."""
-    if not (is_number(value) and isinstance(value, Integral) and value >= 1):
-        remedy = "give a whole number from 1 on"
-    elif value > MOST:
-        remedy = f"give no more than {MOST}"
-    else:
-        return int(value)
-    raise ParameterError(f"{name} = {shortened(value)} is not usable", remedy)
+    """Return a whole number from 1 to `MOST`. Raises `ParameterError` for anything else."""
+    count = check_whole(name, value, 1)
+    if count > MOST:
+        raise ParameterError(
+            f"{name} = {shortened(value)} is not usable", f"give no more than {MOST}"
+        )
+    return count
 
 
 def _refuse_impossible(bound: BoundSystem, start: HybridState) -> None:

@@ -282,16 +282,7 @@ class SpaceRobot:
 
     def _mass(self, link: str, top: float, way: float) -> tuple[float, float, float]:
         """Mass, centre from its top and pitch inertia of a link with its feet, which are points."""
-        numbers, robot = self.robot.numbers, self.robot
-        parts = [tuple(numbers[f"{link}.{each}"] for each in ("mass", "com", "inertia"))]
-        parts += [
-            (numbers[f"{foot}.mass"], numbers[f"{foot}.at"], 0.0)
-            for foot, carrier in robot.feet.items()
-            if carrier == link
-        ]
-        mass = sum(part for part, _, _ in parts)
-        com = sum(part * at for part, at, _ in parts) / mass
-        inertia = sum(own + part * (at - com) ** 2 for part, at, own in parts)
+        mass, com, inertia = self.robot.linkage.with_feet(link)
         return mass, way * (com - top), inertia
 
 

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import sympy as sp
 
-from flexspine.hybrid.compile import Array, BoundSystem, CompiledSystem
+from flexspine.hybrid.bound import BoundSystem
+from flexspine.hybrid.compile import Array, CompiledSystem
 from flexspine.hybrid.outcome import Outcome, OutcomeKind
 from flexspine.hybrid.system import Arming, Guard
 from flexspine.hybrid.trajectory import HybridState

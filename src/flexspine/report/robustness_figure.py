@@ -42,7 +42,7 @@ SHOWN = {"m": (1000.0, "mm"), "1": (100.0, "%"), "N s": (1.0, "N s")}
 def plot_robustness(found: Robustness, animals: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw the share of runs that survived, by animal, with its 95 % interval.
 
-    ``animals`` tells of each gait what `stabilizer_record` does.
+    ``animals`` tells of each gait what ``flexspine.control.steered_record.stabilizer_record`` does.
     """
     factor, unit = SHOWN[found.kind.unit]
     shared, own = _gaits([animals[name] for name in found.animals])

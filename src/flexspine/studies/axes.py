@@ -36,11 +36,14 @@ FORMS = (
 
 @dataclass(frozen=True)
 class Axis:
-    """What varies, and over which values: listed, or a range with ``steps`` points on a grid.
+    """What varies in a sweep, and over which values.
 
-    A range is from ``low`` to ``high``, or about a model's own value: ``around`` it by a share, or
-    ``within`` an amount (SI, radians). One that ``keeps`` the energy follows from the others: it is
-    the apex speed at which a start has the energy of the model's own, 0 where it has more at rest.
+    ``name`` is that of a parameter (dotted), an apex coordinate, a touchdown angle, or of
+    ``energy`` and ``mean_speed``. ``values`` are listed, or there is a range with ``steps`` points
+    on a grid: from ``low`` to ``high``, or about a model's own value, ``around`` it by a share or
+    ``within`` an amount (SI, radians). An axis that ``keeps`` the energy follows from the others:
+    it is the apex speed at which a start has the energy of the model's own, 0 where it has more at
+    rest.
     """
 
     name: str
@@ -84,7 +87,7 @@ class Axis:
         return axis
 
     def record(self) -> Any:
-        """What a file would say of it."""
+        """Return what a file would say of it."""
         if self.values:
             return list(map(float, self.values))
         bounds = {n: getattr(self, n) for n in ("low", "high", "around", "within")}
@@ -93,7 +96,7 @@ class Axis:
         return record | {n: value for n, value in others.items() if value is not None}
 
     def range(self, own: float) -> tuple[float, float]:
-        """Lowest and highest value for a model whose own is ``own``."""
+        """Return the lowest and the highest value for a model whose own is ``own``."""
         if self.values:
             return min(self.values), max(self.values)
         if self.low is not None and self.high is not None:
@@ -105,12 +108,12 @@ class Axis:
         return own - room, own + room
 
     def own(self, model: Model | Walker) -> float:
-        """The value of a model that the axis is about, if it is about one."""
+        """Return the value of a model that the axis is about, NaN if it is about none."""
         about = self.around is not None or self.within is not None
         return own_value(model, self.name) if about else float("nan")
 
     def grid(self, own: float) -> Array:
-        """Its values on a grid."""
+        """Return its values on a grid, for a model whose own is ``own``."""
         if self.values:
             return np.array(self.values)
         assert self.steps is not None
@@ -118,7 +121,7 @@ class Axis:
         return np.linspace(low, high, self.steps)
 
     def sample(self, own: float, share: Array) -> Array:
-        """Its values at shares from 0 to 1 of it."""
+        """Return its values at shares (k,) from 0 to 1 of it, shape (k,)."""
         if self.values:
             places = np.minimum((share * len(self.values)).astype(int), len(self.values) - 1)
             chosen: Array = np.array(self.values)[places]

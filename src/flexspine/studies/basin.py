@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,11 +64,13 @@ class Other:
 class Basin:
     """What became of starts on a slice through the apex of a gait.
 
-    ``over`` are the two coordinates varied (SI), ``values`` theirs; ``wanted`` strides were to be
-    run. By start, shape (first, second): ``strides`` completed; ``deviation`` from the gait, from
-    whichever of its apexes is nearest, in natural units after all strides, NaN if it ended before;
-    ``possible`` is False where a body at rest would have more than the energy kept. ``radius`` is
-    the gait's on its energy level. ``others`` is where else they end, the most common first.
+    ``name`` is that of the gait, ``model`` starts on it, ``energy`` (J) is its total energy and
+    ``radius`` its spectral radius on its energy level; ``energy_kept`` if all starts have that
+    energy. ``over`` are the two coordinates varied (SI), ``values`` theirs; ``wanted`` strides were
+    to be run. By start, shape (first, second): ``strides`` completed; ``deviation`` from the gait,
+    from whichever of its apexes is nearest, in natural units after all strides, NaN if it ended
+    before; ``possible`` is False where a body at rest would have more than the energy kept.
+    ``others`` is where else they end, the most common first.
     """
 
     name: str
@@ -87,16 +88,16 @@ class Basin:
 
     @property
     def lasted(self) -> NDArray[np.bool_]:
-        """Which starts ran all strides."""
+        """Which starts ran all strides, shape (first, second)."""
         return np.isfinite(self.deviation)
 
     @property
     def settled(self) -> NDArray[np.bool_]:
-        """Which starts came to this very gait."""
+        """Which starts came to this very gait, within 1e-6 natural units, (first, second)."""
         return self.deviation < SETTLED
 
     def row(self) -> Row:
-        """The gait, and how many starts came to what."""
+        """Return the gait, and how many starts came to what, by column; SI and radians."""
         return {
             "name": self.name,
             **{f"apex_{name}": value for name, value in self.model.apex.items()},
@@ -143,9 +144,11 @@ def basin_plan(
 ) -> Plan:
     """Plan runs of ``strides`` strides from starts about each of ``gaits``, given by name.
 
-    ``over`` names two apex coordinates and how far to go from the gait in each (SI, radians),
-    ``points`` how many values. With ``keep_energy`` the apex speed follows from the others.
-    Raises `ParameterError` and `UnknownNameError`.
+    ``over`` names two apex coordinates and how far to go from the gait in each, to both sides (SI,
+    radians), ``points`` how many values of each; None: pitch and pitch rate of a body that does not
+    bend, else both pitches. With ``keep_energy`` the apex speed follows from the others. `sweep`
+    does the plan, `read_basins` reads what it found. Raises `ParameterError` and
+    `UnknownNameError`.
     """
     if not gaits:
         raise ParameterError("there is no gait", "give one at least")
@@ -206,7 +209,11 @@ def _check_gait(name: str, gait: Gait, over: Mapping[str, float]) -> None:
 
 
 def read_basins(path: str | Path) -> list[Basin]:
-    """Read what a sweep of `basin_plan` has found. Raises `InputError`."""
+    """Read what a sweep of `basin_plan` has found, a basin for each gait.
+
+    ``path`` is the directory of the sweep. Raises `InputError` if it holds none, or an unfinished
+    one.
+    """
     folder = Path(path)
     plan = read_plan_of(folder)
     free = free_axes(plan.axes)
@@ -223,7 +230,7 @@ def _basin(store: Store, number: int) -> Basin:
     kept = len(plan.axes) > len((first, second))
     ends = [f"apex_{name}" for name in model.apex]
     speeds = ["at_speed"] if kept else []
-    table = read_columns(store, number, ["outcome", "strides", *ends, *speeds])
+    table = store.columns(number, ["outcome", "strides", *ends, *speeds])
     # The speed is exactly zero only where there is none that keeps the energy.
     possible = table["at_speed"] != 0 if kept else np.ones(len(table["strides"]), dtype=bool)
     lasted = (table["outcome"] == "completed") & possible
@@ -261,20 +268,3 @@ def _others(gait: Gait, ends: Array) -> Iterator[Other]:
         found = examine(gait.model.with_values(apex=apex), tolerance=gait.tolerance)
         radius = None if found.flaw else floquet_multipliers(found).level_spectral_radius
         yield Other(apex, int(counts[which]), radius)
-
-
-def read_columns(store: Store, number: int, names: list[str]) -> dict[str, NDArray[Any]]:
-    """Columns of all rows of one of a sweep's models, in order. Raises `InputError`."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    each = store.plan.chunks_each
-    files = [store.file(chunk) for chunk in range(number * each, (number + 1) * each)]
-    try:
-        tables = [pq.ParquetFile(file).read(columns=names) for file in files]
-    except FileNotFoundError:
-        raise InputError(f"'{store.path}' is not finished", "finish the sweep first") from None
-    except pa.ArrowInvalid:
-        raise InputError(f"'{store.path}' is damaged", "begin it anew") from None
-    whole = pa.concat_tables(tables)
-    return {name: whole[name].to_numpy() for name in names}

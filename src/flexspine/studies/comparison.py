@@ -17,6 +17,9 @@ NO_DIFFERENCE = 1e-3
 # m/s between the speeds at which bodies are compared.
 SPEED_STEP = 0.05
 
+# Of a speed step; the ends of a range are on the grid if they are this close to it.
+ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -84,8 +87,8 @@ class Comparison:
 def common_speeds(study: SpineStudy) -> list[float]:
     """The grid of speeds at which bodies are compared."""
     low, high = study.setting.speeds
-    first = int(np.ceil(low / SPEED_STEP - 1e-9))
-    last = int(np.floor(high / SPEED_STEP + 1e-9))
+    first = int(np.ceil(low / SPEED_STEP - ROUNDING))
+    last = int(np.floor(high / SPEED_STEP + ROUNDING))
     return [round(number * SPEED_STEP, 9) for number in range(first, last + 1)]
 
 

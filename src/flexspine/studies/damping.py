@@ -134,7 +134,7 @@ def study_damping(
     study: SpineStudy,
     setting: DampedSetting | None = None,
     store: Path | None = None,
-    progress: Callable[[str, float], None] = lambda _what, _share: None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> DampingStudy:
     """Follow damped gaits from those of the stiffest spine that runs at each compared speed.
 
@@ -150,7 +150,9 @@ def study_damping(
 
     def trace(gait: Gait, over: str, bounds: tuple[float, float], actuator: str, at: str) -> Branch:
         name = f"damped gaits over {over} {at} by {actuator}"
-        progress(name, next(done) / whole)
+        share = next(done) / whole
+        if progress is not None:
+            progress(name, share)
         file = None if store is None else store / f"{name.replace(' ', '-')}.jsonl"
         return trace_branch(
             gait, over, bounds=bounds, free=(actuator,), longest_step=STEP, store=file

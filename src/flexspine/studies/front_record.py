@@ -36,7 +36,10 @@ def front_rows(found: Optimisation) -> list[Row]:
 
 
 def front_record(found: Optimisation) -> dict[str, Any]:
-    """Return the fronts, what one has over the other, and what all began with."""
+    """Return the fronts, what one has over the other, and what all began with, as JSON holds it.
+
+    SI and radians; ``gains`` are by objective the shares by which stiffness by phase lowers it.
+    """
     return {
         "schema_version": SCHEMA_VERSION,
         "flexspine": __version__,

@@ -16,10 +16,9 @@ from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
 from flexspine.parameters import shortened
 from flexspine.studies.axes import GRID, Axis
-from flexspine.studies.basin import read_columns
 from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
-from flexspine.studies.tables import Row
+from flexspine.studies.tables import Row, known
 from flexspine.studies.task_kinds import GAITS
 
 STIFFNESS, SPEED = "spine.stiffness", "mean_speed"
@@ -34,12 +33,13 @@ AT_BOUND = 1e-9
 
 @dataclass(frozen=True)
 class GaitMap:
-    """Gaits over spine stiffness (N m/rad) and mean speed (m/s), at one energy and apex height.
+    """Gaits over spine stiffness and mean speed, at one ``energy`` (J) and apex ``height`` (m).
 
-    Shape (stiffnesses, speeds), NaN where there is no gait: ``peak_grf`` in N per pair of legs,
-    also NaN for a gait that could not be run as far as its peak; ``radius`` on the energy level.
-    ``slowest`` and ``fastest`` (stiffnesses,) are the speeds at which gaits end, NaN if they do
-    not within the map. ``reasons`` tells, by stiffness, why they end where they do.
+    ``stiffnesses`` (n,) are in N m/rad, ``speeds`` (m,) in m/s. Shape (n, m), NaN where there is no
+    gait: ``peak_grf`` in N per pair of legs, also NaN for a gait that could not be run as far as
+    its peak; ``radius``, the spectral radius on the energy level. ``slowest`` and ``fastest`` (n,)
+    are the speeds at which gaits end, NaN if they do not within the map. ``reasons`` tells, by
+    stiffness, why they end where they do. ``model`` starts on the gait that was followed.
     """
 
     model: Model
@@ -64,7 +64,10 @@ class GaitMap:
         return int((self.radius < 1).sum())
 
     def extremes(self, values: Array) -> Row | None:
-        """The least and the largest of one value a gait, and where they are."""
+        """Return the least and the largest of ``values`` (n, m), and where; None of no gaits.
+
+        ``values`` are such as ``radius`` or ``peak_grf``.
+        """
         if not np.isfinite(values).any():
             return None
         places = {"least": np.nanargmin(values), "largest": np.nanargmax(values)}
@@ -76,26 +79,26 @@ class GaitMap:
         return {name: float(v) for name, v in {"value": values[i, j], **where}.items()}
 
     def ends(self) -> list[Row]:
-        """By stiffness, the speeds at which gaits end, None where they reach beyond the map."""
+        """Return by stiffness the speeds at which gaits end, None where they reach beyond."""
         columns = (self.stiffnesses, self.slowest, self.fastest, self.reasons)
         return [
             {
                 "spine_stiffness": float(stiffness),
-                "slowest": _known(slowest),
-                "fastest": _known(fastest),
+                "slowest": known(slowest),
+                "fastest": known(fastest),
                 "reason": reason,
             }
             for stiffness, slowest, fastest, reason in zip(*columns, strict=True)
         ]
 
     def rows(self) -> list[Row]:
-        """A row for every point of the map, None where there is no gait."""
+        """Return a row for every point of the map, None where there is no gait."""
         return [
             {
                 "spine_stiffness": float(stiffness),
                 "mean_speed": float(speed),
-                "peak_grf": _known(self.peak_grf[i, j]),
-                "level_spectral_radius": _known(self.radius[i, j]),
+                "peak_grf": known(self.peak_grf[i, j]),
+                "level_spectral_radius": known(self.radius[i, j]),
                 "stable": bool(self.radius[i, j] < 1) if np.isfinite(self.radius[i, j]) else None,
             }
             for i, stiffness in enumerate(self.stiffnesses)
@@ -113,8 +116,8 @@ def map_plan(
 ) -> Plan:
     """Plan to follow a gait over ``points`` mean speeds, for each of ``lines`` stiffnesses.
 
-    Both ranges are low and high, SI. Energy and apex height are the gait's. Raises
-    `ParameterError` and `UnknownNameError`.
+    Both ranges are low and high, SI. Energy and apex height are the gait's. `sweep` does the plan,
+    `read_map` reads what it found. Raises `InputError`.
     """
     if not isinstance(gait, Gait):
         raise ParameterError(f"{shortened(gait)} is no gait", "make one with examine(model)")
@@ -139,7 +142,11 @@ def map_plan(
 
 
 def read_map(path: str | Path) -> GaitMap:
-    """Read what a sweep of `map_plan` has found. Raises `InputError`."""
+    """Read what a sweep of `map_plan` has found.
+
+    ``path`` is the directory of the sweep. Raises `InputError` if it holds none, or an unfinished
+    one.
+    """
     folder = Path(path)
     plan = read_plan_of(folder)
     names = tuple(axis.name for axis in plan.axes)
@@ -147,7 +154,7 @@ def read_map(path: str | Path) -> GaitMap:
         raise InputError(f"'{folder}' holds no map", "give a directory of 'flexspine map'")
     peaks = [f"peak_grf_{side}" for side in SIDES]
     more = ["branch_from", "branch_to", "confirmed", "level_spectral_radius", "reason"]
-    table = read_columns(Store(folder, plan), 0, [*peaks, *more])
+    table = Store(folder, plan).columns(0, [*peaks, *more])
     stiffnesses, speeds = (axis.grid(0.0) for axis in plan.axes)
     shape = (len(stiffnesses), len(speeds))
     confirmed = np.array(table["confirmed"], dtype=float) == 1
@@ -167,7 +174,3 @@ def read_map(path: str | Path) -> GaitMap:
         fastest=np.where(high < speeds[-1] - room, high, np.nan),
         reasons=tuple(next((str(r) for r in line if r is not None), "") for line in why),
     )
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

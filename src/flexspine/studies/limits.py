@@ -14,8 +14,8 @@ from flexspine.control.disturbance import Draw, disturbance, endure
 from flexspine.control.stabilize import Stabilizer, stabilize
 from flexspine.errors import FlexspineError, ParameterError
 from flexspine.gaits.gait import Gait, examine
-from flexspine.gaits.problem import ANGLES
 from flexspine.gaits.stability import floquet_multipliers
+from flexspine.models.legs import ANGLES
 from flexspine.models.model import Model, check_between
 from flexspine.models.simulation import check_count
 from flexspine.studies.following import Line, LostGaitError, carried
@@ -34,7 +34,7 @@ NOISY_STRIDES, UPSET_STRIDES = 1000, 50
 THRUST = "legs.extension"
 
 
-class Design(NamedTuple):
+class FeedbackDesign(NamedTuple):
     """A way to stabilise: what is steered, and whether at both flight apexes."""
 
     name: str
@@ -43,9 +43,9 @@ class Design(NamedTuple):
 
 
 DESIGNS = (
-    Design("angles, once", ANGLES, False),
-    Design("angles, twice", ANGLES, True),
-    Design("angles and thrust, twice", (*ANGLES, THRUST), True),
+    FeedbackDesign("angles, once", ANGLES, False),
+    FeedbackDesign("angles, twice", ANGLES, True),
+    FeedbackDesign("angles and thrust, twice", (*ANGLES, THRUST), True),
 )
 
 
@@ -122,7 +122,7 @@ class _Piece(NamedTuple):
     stiffness: float
     speed: float
     gait: Gait | None
-    design: Design
+    design: FeedbackDesign
     limits: tuple[Limit, ...]
     reason: str | None
 
@@ -132,16 +132,20 @@ def find_limits(
     stiffnesses: Sequence[float],
     speeds: Sequence[float],
     *,
-    designs: Sequence[Design] = DESIGNS,
+    designs: Sequence[FeedbackDesign] = DESIGNS,
     limits: Sequence[Limit] = LIMITS,
     processes: int = 1,
     store: Path | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Cell]:
-    """Find the limits of the model's gait at every spine stiffness (N m/rad) and mean speed (m/s).
+    """Find what the model's gait survives at most, over spine stiffness and mean speed.
 
-    ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
-    share the work without a change to results. Raises `ParameterError` and `OutputError`.
+    ``stiffnesses`` are in N m/rad, ``speeds`` in m/s. At each of them the gait is stabilised by
+    every one of ``designs``, and the largest noise, push (N s) and step (m) of ``limits`` found by
+    doubling and bisection, to a tenth of itself. ``store`` is a file that keeps what is done; the
+    same call goes on from there. ``processes`` share the work without a change to results.
+    ``progress`` is told how many pieces are done, and of how many. Raises `ParameterError` and
+    `OutputError`.
     """
     _check(model, stiffnesses, speeds)
     pieces = [
@@ -201,18 +205,14 @@ def _gaits(
 
 
 def _examine_piece(piece: _Piece) -> Cell:
+    at = piece.stiffness, piece.speed, piece.design.name
+    if piece.gait is None:
+        return Cell(*at, None, None, {}, piece.reason)
     radius = None
     try:
-        if piece.gait is None:
-            raise FlexspineError(piece.reason or "", "")
         radius = floquet_multipliers(piece.gait).spectral_radius
         found = stabilize(piece.gait, piece.design.inputs, twice=piece.design.twice)
     except FlexspineError as failure:
-        return Cell(
-            piece.stiffness, piece.speed, piece.design.name, radius, None, {}, failure.message
-        )
+        return Cell(*at, radius, None, {}, failure.message)
     limits = {limit.name: largest(found, limit) for limit in piece.limits}
-    return Cell(
-        piece.stiffness, piece.speed, piece.design.name, radius, found.level_spectral_radius,
-        limits, None,
-    )  # fmt: skip
+    return Cell(*at, radius, found.level_spectral_radius, limits, None)

@@ -20,7 +20,7 @@ from flexspine.gaits.gait_record import gait_record
 from flexspine.gaits.search import find_gaits
 from flexspine.models.actuation import ACTUATORS, SPINE_SHIFTS, STRIDE_PHASES
 from flexspine.models.simulation import check_count
-from flexspine.parameters import is_number
+from flexspine.parameters import check_seed, check_whole, is_number
 from flexspine.studies.design import Design, Ranges
 from flexspine.studies.following import SAME, STEP
 from flexspine.studies.frontier import Found, Frontier
@@ -54,17 +54,19 @@ WIDE = 10.0
 
 
 class NoGaitError(FlexspineError):
-    """There is no gait of the kind that was asked for."""
+    """There is no gait of the kind that was asked for. Exit code 1."""
 
     code = "no_gait"
 
 
 @dataclass(frozen=True)
 class Optimisation:
-    """The fronts, by kind of spine.
+    """Pareto fronts of gaits, by kind of spine: ``constant`` stiffness and stiffness ``by phase``.
 
     ``reference`` is the given gait, carried to the speed. Of the two objectives in ``minimise``
-    the second one had limits. ``ranges`` are what was varied, by kind of spine.
+    the second one had limits. ``ranges`` are what was varied, low and high (SI) by name, by kind of
+    spine. The ``points`` of each of the ``fronts`` are gaits with their stability, in order of the
+    second objective.
     """
 
     reference: Gait
@@ -94,18 +96,21 @@ def optimise(
     seed: int = 0,
     store: str | Path | None = None,
     processes: int = 1,
-    progress: Progress = lambda _what, _share: None,
+    progress: Progress | None = None,
 ) -> Optimisation:
     """Find the gaits at a mean speed that are best in two objectives, with both kinds of spines.
 
-    Objectives are ``peak_grf``, ``cost_of_transport`` and ``spectral_radius``. ``ranges`` are low
-    and high (SI) of parameters, and of what else need not stay as it is in the gait: ``energy``,
-    ``height`` and other apex coordinates, touchdown angles. ``shift`` is how far the stiffness may
-    differ in other phases from that around the apex, relative. ``points`` are limits of the second
-    objective for which the least first one is looked for, ``draws`` random designs to start from
-    besides the given gait. ``store`` is a file that keeps every finished piece: the same call goes
-    on from it. The same seed finds the same fronts, whatever ``processes``. Raises `InputError`,
-    and `NoGaitError` where there is no gait to start from.
+    ``speed`` is in m/s, by default the gait's own. ``minimise`` names the objectives: two of
+    ``peak_grf``, ``cost_of_transport`` and ``spectral_radius``. ``ranges`` are low and high (SI) of
+    parameters, and of what else need not stay as it is in the gait: ``energy``, ``height`` and
+    other apex coordinates, touchdown angles. ``shift`` is how far the stiffness may differ in other
+    phases from that around the apex, relative. ``spines`` are the kinds to do. ``points`` are
+    limits of the second objective for which the least first one is looked for, ``draws`` random
+    designs to start from besides the given gait. ``store`` is a file that keeps every finished
+    piece: the same call goes on from it. The same seed finds the same fronts, whatever
+    ``processes``. ``progress`` is told what is done and which share of it, 0 to 1. By the epsilon
+    constraint method: Haimes, Lasdon, Wismer 1971. Raises `InputError`, and `NoGaitError` where
+    there is no gait to start from.
     """
     check_count("points", points)
     _check(minimise, spines, draws, seed)
@@ -134,7 +139,8 @@ def optimise(
         found = _search(frontiers, points, draws, seed)
     fronts = {}
     for (spine, design), best in zip(designs.items(), found, strict=True):
-        progress(f"{spine}: certifying", 0.0)
+        if progress is not None:
+            progress(f"{spine}: certifying", 0.0)
         models = [design.animal(np.array(each.point)) for each in best]
         certified = [certify(model, reference.tolerance) for model in models]
         fronts[spine] = Front.of(spine, pair, certified)
@@ -184,9 +190,8 @@ def _check(minimise: Sequence[str], spines: Sequence[str], draws: int, seed: int
     for name in spines:
         if name not in SPINES:
             raise UnknownNameError("kind of spine", name, SPINES)
-    for what, count in (("draws", draws), ("seed", seed)):
-        if not (isinstance(count, int) and count >= 0):
-            raise ParameterError(f"{what} = {count} is not usable", "give a whole number from 0 on")
+    check_whole("draws", draws, 0)
+    check_seed(seed)
 
 
 def _search(frontiers: Sequence[Frontier], points: int, draws: int, seed: int) -> list[list[Found]]:

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from flexspine.engines.mujoco_planar import Motion, PinnedMujoco
+from flexspine.engines.mujoco_planar import PinnedMotion, PinnedMujoco
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.models.pinned import Energies, PinnedRun, crouch, swing
@@ -46,7 +46,7 @@ class PinnedCase:
     run: PinnedRun
     times: Array
     steps: tuple[float, ...]
-    theirs: tuple[Motion, ...]
+    theirs: tuple[PinnedMotion, ...]
 
     @cached_property
     def angles(self) -> Array:
@@ -114,7 +114,10 @@ class PinnedCase:
 
 @dataclass(frozen=True)
 class PinnedCheck:
-    """A robot pinned by a foot: without dampers, and with those that it has, if any."""
+    """A robot pinned by a foot and let go, by our equations and by MuJoCo's.
+
+    ``cases`` are its motions, without dampers and with those that it has, if any.
+    """
 
     robot: Robot
     foot: str
@@ -122,7 +125,7 @@ class PinnedCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether every motion is MuJoCo's."""
+        """Whether every motion is MuJoCo's: close at its smallest step, and of its order."""
         return all(case.agrees for case in self.cases)
 
 
@@ -132,14 +135,14 @@ def check_pinned(
     *,
     seconds: float = SECONDS,
     step: float = STEP,
-    progress: Callable[[str], None] = lambda _name: None,
+    progress: Callable[[str], None] | None = None,
 ) -> PinnedCheck:
     """Let a passive robot go from a crouch, held by a foot: by our equations and by MuJoCo's.
 
     ``foot`` is the robot's first if none is given, ``seconds`` how long it swings, ``step`` the
-    largest of MuJoCo's steps in s, shortened to divide `COMPARED`; each of the others is half the
-    one before. ``progress`` is told what is done next.
-    Raises `MachineError` without a MuJoCo that will do, `UnknownNameError` for an unknown foot,
+    largest of MuJoCo's steps in s, shortened to divide the 0.5 s in which both have to agree; each
+    of the others is half the one before. ``progress`` is told what is done next. Raises
+    `MachineError` without a MuJoCo that will do, `UnknownNameError` for an unknown foot,
     `ParameterError` for times that are not usable and `StateError` if the motion cannot be
     integrated.
     """
@@ -159,7 +162,8 @@ def check_pinned(
         kinds["with dampers"] = robot
     cases = []
     for name, each in kinds.items():
-        progress(name)
+        if progress is not None:
+            progress(name)
         cases.append(_case(name, each, foot, seconds, step))
     return PinnedCheck(robot, foot, tuple(cases))
 

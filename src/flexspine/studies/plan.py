@@ -1,4 +1,4 @@
-"""What a sweep does: read from a TOML file, written down so that it can be repeated."""
+"""What a sweep does, written down so that it can be repeated."""
 
 from __future__ import annotations
 
@@ -33,13 +33,15 @@ EACH = {SEARCHES: 16, WALKS: 4}
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep: a ``task`` at points of ``axes``, for each of ``models``, walkers if they walk.
+    """A sweep: a task at points of axes, for each of some models.
 
-    ``method`` is ``grid``, ``random`` or ``sobol``; the latter two draw ``samples`` points a model
-    from ``seed``. ``chunk`` points make a piece of work and a file. ``options`` are the task's:
-    ``strides`` of runs; ``starts``, ``symmetric`` and ``fixed`` of searches; the axis ``over``
-    which gaits are followed, and ``symmetric``; ``tolerance`` of all these; ``seconds`` and
-    ``sensing`` of walks.
+    ``models`` are a `Model` each, or a `Walker` each if they walk; ``axes`` an `Axis` each.
+    ``task`` is ``runs``, ``searches`` (of gaits), ``gaits`` (followed over the last axis) or
+    ``walks``. ``method`` is ``grid``, ``random`` or ``sobol``; the latter two draw ``samples``
+    points a model from ``seed``. ``chunk`` points make a piece of work and a file. ``options`` are
+    the task's: ``strides`` of runs; ``starts``, ``symmetric`` and ``fixed`` of searches; the axis
+    ``over`` which gaits are followed, and ``symmetric``; ``tolerance`` of all these; ``seconds``
+    and ``sensing`` (rad) of walks. Raises `InputError` for what cannot be done.
     """
 
     models: tuple[Model | Walker, ...]
@@ -83,7 +85,7 @@ class Plan:
         return self.chunks_each * len(self.models)
 
     def body(self, model: Model) -> Model:
-        """A model with every parameter as far from zero as the axes make it; see `make_cases`."""
+        """Return a model with every parameter as far from zero as the axes make it."""
         known = values(model.parameters)
         own = {axis.name: known[axis.name] for axis in self.axes if axis.name in known}
         return model.with_values(
@@ -92,7 +94,7 @@ class Plan:
 
     @property
     def tolerance(self) -> float:
-        """The integrator's."""
+        """The integrator's tolerance."""
         return float(self.options.get("tolerance", DEFAULT_TOLERANCE))
 
     @property
@@ -106,13 +108,13 @@ class Plan:
         return tuple(model for model in self.models if isinstance(model, Walker))
 
     def of_chunk(self, chunk: int) -> tuple[Model | Walker, int, int]:
-        """A chunk's model, its first point among that model's and how many points it has."""
+        """Return a chunk's model, its first point among that model's and how many it has."""
         number, part = divmod(chunk, self.chunks_each)
         first = part * self.chunk_points
         return self.models[number], first, min(self.chunk_points, self.points - first)
 
     def at(self, chunk: int) -> dict[str, Array]:
-        """The points of a chunk: values of every axis by name."""
+        """Return the points of a chunk: values of every axis by name, each (points,)."""
         model, first, count = self.of_chunk(chunk)
         if self.method == GRID:
             return grid_points(model, self.axes, first, count)
@@ -120,7 +122,7 @@ class Plan:
         return sampled_points(model, self.axes, self.method, seed, first, count)
 
     def record(self) -> dict[str, Any]:
-        """All that decides the rows, as JSON holds it."""
+        """Return all that decides the rows, as JSON holds it."""
         record = {
             "task": self.task,
             "method": self.method,
@@ -129,7 +131,9 @@ class Plan:
             "options": self.all_options,
             "axes": {axis.name: axis.record() for axis in self.axes},
             "models": [
-                model.record() if isinstance(model, Walker) else model_record(model)
+                model.record()
+                if isinstance(model, Walker)
+                else {"name": model.name, **model.record()}
                 for model in self.models
             ],
             "chunk": self.chunk_points,
@@ -166,17 +170,6 @@ class Plan:
         """A short name of all that decides the rows."""
         text = json.dumps(self.record(), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def model_record(model: Model) -> dict[str, Any]:
-    """A model's numbers, from which it can be made again."""
-    return {
-        "name": model.name,
-        "model": model.kind.name,
-        "parameters": values(model.parameters),
-        "apex": dict(model.apex),
-        "touchdown": dict(model.touchdown),
-    }
 
 
 def _revived(record: Mapping[str, Any]) -> Model | Walker:

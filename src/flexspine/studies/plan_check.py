@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexspine.errors import InputError, ParameterError, UnknownNameError
-from flexspine.models.legs import SIDES
+from flexspine.models.legs import ANGLES
 from flexspine.models.many import make_cases
 from flexspine.models.model import TOLERANCES, Model, check_between
 from flexspine.models.simulation import DEFAULT_TOLERANCE, check_count
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from flexspine.studies.plan import Plan
 
 WORDS = {bool: "true or false", dict: "a table", str: "the name of an axis"}
-
-ANGLES = tuple(f"touchdown.{side}" for side in SIDES)
 
 # Seeds fit into a TOML file and into a manifest.
 SEEDS = 2**63

@@ -28,7 +28,10 @@ FLEXIBLE, LOCKED = "flexible", "locked"
 
 
 def read_plan(path: str | Path) -> Plan:
-    """Read a plan from a TOML file. Raises `InputError`."""
+    """Read the plan of a sweep from a TOML file; paths in it are from the file's directory.
+
+    Raises `InputError`.
+    """
     try:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as failure:

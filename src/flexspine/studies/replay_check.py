@@ -17,7 +17,7 @@ import numpy as np
 
 from flexspine.control.trot import Trot, trot
 from flexspine.engines.installed import mujoco_module
-from flexspine.engines.replay import Motion, Replay, replay
+from flexspine.engines.replay import PlanarMotion, Replay, replay
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
 from flexspine.models.robot import Robot
@@ -28,7 +28,7 @@ SECONDS, INTERVAL = 2.0, 2e-3
 
 
 @dataclass(frozen=True)
-class Ground:
+class SoftGround:
     """Feet and ground in MuJoCo: radius (m), stiffness (N/m), damping (N s/m), time step (s)."""
 
     radius: float
@@ -40,10 +40,10 @@ class Ground:
 # From the feet and the ground of the description's own order to nearly points on nearly rigid
 # ground; damping keeps the shock of landing alike, and steps follow the stiffness.
 GROUNDS = (
-    Ground(0.035, 5e4, 1e3, 2.5e-4),
-    Ground(0.001, 5e4, 1e3, 2.5e-4),
-    Ground(0.001, 5e5, 3e3, 1e-4),
-    Ground(0.001, 5e6, 1e4, 2.5e-5),
+    SoftGround(0.035, 5e4, 1e3, 2.5e-4),
+    SoftGround(0.001, 5e4, 1e3, 2.5e-4),
+    SoftGround(0.001, 5e5, 3e3, 1e-4),
+    SoftGround(0.001, 5e6, 1e4, 2.5e-5),
 )
 
 # rad, m, share: how close the last of them has to come (root mean squares over the motion, and the
@@ -60,7 +60,7 @@ class ReplayCase:
     ``correction`` is that of the torque of springs and dampers (N m).
     """
 
-    ground: Ground
+    ground: SoftGround
     replay: Replay
     com: Array
     normal_wanted: Array
@@ -110,10 +110,13 @@ class ReplayCase:
 
 @dataclass(frozen=True)
 class ReplayCheck:
-    """A trot of the planar robot and its replays, each on a ground closer to ours."""
+    """A trot of the planar robot, ``run``, and its replays, each on a ground closer to ours.
+
+    ``motion`` is what was replayed, a case of ``cases`` what came of it on one ground.
+    """
 
     run: RobotRun
-    motion: Motion
+    motion: PlanarMotion
     cases: tuple[ReplayCase, ...]
 
     @property
@@ -133,16 +136,18 @@ def check_replay(
     robot: Robot,
     *,
     seconds: float = SECONDS,
-    grounds: tuple[Ground, ...] = GROUNDS,
-    progress: Callable[[str], None] = lambda _what: None,
+    grounds: tuple[SoftGround, ...] = GROUNDS,
+    progress: Callable[[str], None] | None = None,
 ) -> ReplayCheck:
     """Let a planar robot trot by computed torque, and replay it in MuJoCo on every ground.
 
-    Raises `MachineError` without a MuJoCo that will do, and `ParameterError` for a robot that
-    cannot trot or is not described in space.
+    The trot lasts ``seconds`` (s); ``grounds`` come ever closer to rigid ground under feet that are
+    points. ``progress`` is told what is done next. Raises `MachineError` without a MuJoCo that will
+    do, and `ParameterError` for a robot that cannot trot or is not described in space.
     """
     mujoco_module()
-    progress("trotting in the plane")
+    tell = progress or (lambda _what: None)
+    tell("trotting in the plane")
     run = trot(robot, Trot(seconds=seconds))
     if not run.outcome.completed:
         raise ParameterError(
@@ -151,13 +156,13 @@ def check_replay(
     times: Array = INTERVAL * np.arange(round(seconds / INTERVAL) + 1, dtype=float)
     times = times[times <= run.trajectory.duration]
     dataset = robot_dataset(run, times=times)
-    motion = Motion(times, *_coordinates(run, times), dataset["torque"].values)
+    motion = PlanarMotion(times, *_coordinates(run, times), dataset["torque"].values)
     stands = dataset["stands"].values > 0
     normal = np.where(stands, dataset["grf"].values[..., 1], 0.0)
     feet = [list(robot.feet).index(leg.foot) for leg in robot.legs.values()]
     cases = []
     for ground in grounds:
-        progress(f"in MuJoCo, feet of {1e3 * ground.radius:g} mm on {ground.stiffness:g} N/m")
+        tell(f"in MuJoCo, feet of {1e3 * ground.radius:g} mm on {ground.stiffness:g} N/m")
         there = robot.with_values(
             {
                 "space.foot_radius": ground.radius,

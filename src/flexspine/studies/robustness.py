@@ -11,7 +11,7 @@ from functools import cached_property
 from itertools import pairwise
 from math import sqrt
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,8 @@ from flexspine.control.disturbance import Disturbance, Draw, Fate, disturbance, 
 from flexspine.control.stabilize import Stabilizer
 from flexspine.errors import ParameterError
 from flexspine.hybrid.compile import Array
-from flexspine.models.model import Model
 from flexspine.models.simulation import check_count
-from flexspine.parameters import check_seed, is_finite, shortened, values
+from flexspine.parameters import check_seed, is_finite, shortened
 from flexspine.workers.lasting import do_all
 
 # Runs that are done, and kept, together: some seconds of work.
@@ -120,7 +119,11 @@ def wilson(survived: int, runs: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """What animals survive of one kind of disturbance up to ``largest``."""
+    """What animals survive of one kind of disturbance, of sizes up to ``largest``.
+
+    Each was to make ``strides`` strides; ``animals`` has by name what became of its runs, all of
+    which met the same disturbances, drawn from ``seed``.
+    """
 
     kind: Disturbance
     largest: float
@@ -130,12 +133,12 @@ class Robustness:
 
     @property
     def signs(self) -> dict[str, int]:
-        """The sides to which it may disturb."""
+        """The sides to which it may disturb, by name: 1, or -1 for negative sizes."""
         return {"positive": 1, "negative": -1} if self.kind.signed else {"positive": 1}
 
     @property
     def edges(self) -> Array:
-        """Of bins of size, shape (bins + 1,)."""
+        """The edges of the bins in which survival is counted by size, shape (bins + 1,)."""
         low = -self.largest if self.kind.signed else 0.0
         return np.linspace(low, self.largest, BINS * len(self.signs) + 1)
 
@@ -161,17 +164,58 @@ def survive(
     seed: int = 0,
     processes: int = 1,
     store: Path | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Robustness:
     """Disturb every animal ``runs`` times at random, each to make ``strides`` strides.
 
-    ``kind`` is push, step, rough, blocks, acting or sensing; sizes are drawn evenly up to
+    ``animals`` are gaits under feedback, by name. ``kind`` is ``push`` (N s), ``step``, ``rough``,
+    ``blocks`` (m), ``acting`` or ``sensing`` (noise, relative); sizes are drawn evenly up to
     ``largest``, to both sides where there are two. ``store`` is a file that keeps what is done;
     the same call goes on from there. ``processes`` share the work without a change to results.
-    ``progress`` is told runs. Raises `UnknownNameError`, `ParameterError` and `OutputError`.
+    ``progress`` is told how many runs are done, and of how many. Raises `UnknownNameError`,
+    `ParameterError` and `OutputError`.
     """
     what = disturbance(kind)
     largest = what.largest if largest is None else largest
+    _check(animals, what, largest, runs, strides, seed)
+    pieces = [
+        _Piece(name, stabilizer, kind, largest, strides, seed, first, min(CHUNK, runs - first))
+        for first in range(0, runs, CHUNK)
+        for name, stabilizer in animals.items()
+    ]
+    done = do_all(
+        _run_piece,
+        pieces,
+        processes=check_count("processes", processes),
+        progress=counting(progress, runs * len(animals)),
+        store=store,
+        description={
+            "kind": kind, "largest": largest, "runs": runs, "strides": strides, "seed": seed,
+            "animals": [
+                [name, {**each.gait.model.record(), **each.settings}]
+                for name, each in animals.items()
+            ],
+        },
+        to_json=list,
+        from_json=lambda rows: [Fate(*row) for row in rows],
+    )  # fmt: skip
+    sizes = np.array([draw(what, largest, seed, k).size for k in range(runs)])
+    fates: dict[str, list[Fate]] = {name: [] for name in animals}
+    for piece, found in zip(pieces, done, strict=True):
+        fates[piece.animal] += found
+    each = {name: Endurance(sizes, tuple(found)) for name, found in fates.items()}
+    return Robustness(what, largest, strides, seed, each)
+
+
+def _check(
+    animals: Mapping[str, Stabilizer],
+    kind: Disturbance,
+    largest: float,
+    runs: int,
+    strides: int,
+    seed: int,
+) -> None:
+    """Refuse what cannot be made before anything is done."""
     if not (is_finite(largest) and largest > 0):
         raise ParameterError(
             f"largest = {shortened(largest)} is not usable", "give a number above zero"
@@ -181,45 +225,18 @@ def survive(
     check_count("strides", strides)
     if not animals:
         raise ParameterError("there is no animal to disturb", "give one or more by name")
-    for each in animals.values():  # what cannot be made is refused before anything is done
-        for sign in (1, -1) if what.signed else (1,):
-            what.make(each.gait, Draw(sign * largest, 0.5, seed), strides)
-    pieces = [
-        _Piece(name, stabilizer, kind, largest, strides, seed, first, min(CHUNK, runs - first))
-        for first in range(0, runs, CHUNK)
-        for name, stabilizer in animals.items()
-    ]
-    whole = runs * len(animals)
-    done = do_all(
-        _run_piece,
-        pieces,
-        processes=check_count("processes", processes),
-        progress=lambda count, of: progress(whole * count // of, whole),
-        store=store,
-        description={
-            "kind": kind, "largest": largest, "runs": runs, "strides": strides, "seed": seed,
-            "animals": [
-                [name, {**about(each.gait.model), **each.settings}]
-                for name, each in animals.items()
-            ],
-        },
-        to_json=list,
-        from_json=lambda rows: [Fate(*row) for row in rows],
-    )  # fmt: skip
-    sizes = np.array([draw(what, largest, seed, k).size for k in range(runs)])
-    found = {
-        name: Endurance(
-            sizes,
-            tuple(
-                fate
-                for piece, fates in zip(pieces, done, strict=True)
-                if piece.animal == name
-                for fate in fates
-            ),
-        )
-        for name in animals
-    }
-    return Robustness(what, largest, strides, seed, found)
+    for each in animals.values():
+        for sign in (1, -1) if kind.signed else (1,):
+            kind.make(each.gait, Draw(sign * largest, 0.5, seed), strides)
+
+
+def counting(
+    progress: Callable[[int, int], None] | None, runs: int
+) -> Callable[[int, int], None] | None:
+    """What is told about pieces, told of so many runs."""
+    if progress is None:
+        return None
+    return lambda done, pieces: progress(runs * done // pieces, runs)
 
 
 def check_runs(runs: int) -> int:
@@ -227,16 +244,6 @@ def check_runs(runs: int) -> int:
     if check_count("runs", runs) > MOST_RUNS:
         raise ParameterError(f"runs = {runs} are too many", f"give no more than {MOST_RUNS}")
     return runs
-
-
-def about(model: Model) -> dict[str, Any]:
-    """All that decides what a model does."""
-    return {
-        "model": model.kind.name,
-        "parameters": values(model.parameters),
-        "apex": dict(model.apex),
-        "touchdown": dict(model.touchdown),
-    }
 
 
 def _run_piece(piece: _Piece) -> list[Fate]:

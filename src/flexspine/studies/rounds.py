@@ -21,9 +21,14 @@ class Rounds:
     """
 
     def __init__(
-        self, crew: Crew, store: Path | None, description: Mapping[str, Any], progress: Progress
+        self,
+        crew: Crew,
+        store: Path | None,
+        description: Mapping[str, Any],
+        progress: Progress | None,
     ) -> None:
-        self._crew, self._progress, self._count = crew, progress, 0
+        self._crew, self._count = crew, 0
+        self._tell = progress or (lambda _what, _share: None)
         self._journal = store and Journal(store, description, "an optimisation", _is_piece)
 
     def do(self, what: str, function: Callable[[Work], Any], works: Sequence[Work]) -> list[Any]:
@@ -32,12 +37,12 @@ class Rounds:
         lines = self._journal.lines if self._journal else []
         done = {line["piece"]: line["result"] for line in lines if line["round"] == number}
         missing = [(i, work) for i, work in enumerate(works) if i not in done]
-        self._progress(what, len(done) / max(len(works), 1))
+        self._tell(what, len(done) / max(len(works), 1))
         for piece, result in self._crew.map(function, missing):
             done[piece] = result
             if self._journal:
                 self._journal.add({"round": number, "piece": piece, "result": result})
-            self._progress(what, len(done) / len(works))
+            self._tell(what, len(done) / len(works))
         return [done[i] for i in range(len(works))]
 
 

@@ -124,7 +124,7 @@ class SpineStudy:
 def study_spines(
     setting: Setting,
     store: Path | None = None,
-    progress: Callable[[str, float], None] = lambda _what, _share: None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> SpineStudy:
     """Trace every branch of the comparison.
 
@@ -136,7 +136,9 @@ def study_spines(
     whole = 3 + len(setting.stiffnesses) + len(setting.compared)
 
     def trace(gait: Gait, over: str, bounds: tuple[float, float], name: str) -> Branch:
-        progress(name, (next(steps) - 1) / whole)
+        share = (next(steps) - 1) / whole
+        if progress is not None:
+            progress(name, share)
         file = None if store is None else store / f"{name.replace(' ', '-')}.jsonl"
         return trace_branch(gait, over, bounds=bounds, longest_step=STEP, store=file)
 

@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import IO, Any
 from urllib.parse import quote
 
+from numpy.typing import NDArray
+
 from flexspine._version import SCHEMA_VERSION, __version__, check_schema
 from flexspine.errors import OUT_OF_SPACE, InputError, OutputError
 from flexspine.parameters import shortened
@@ -146,6 +148,22 @@ class Store:
         model, _, _ = self.plan.of_chunk(chunk)
         folder = self.path / ROWS / f"model={quote(model.name, safe='')}"
         return folder / f"part-{chunk % self.plan.chunks_each:06d}.parquet"
+
+    def columns(self, number: int, names: list[str]) -> dict[str, NDArray[Any]]:
+        """Columns of all rows of a model, by its number, in order. Raises `InputError`."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        each = self.plan.chunks_each
+        files = [self.file(chunk) for chunk in range(number * each, (number + 1) * each)]
+        try:
+            tables = [pq.ParquetFile(file).read(columns=names) for file in files]
+        except FileNotFoundError:
+            raise InputError(f"'{self.path}' is not finished", "finish the sweep first") from None
+        except pa.ArrowInvalid:
+            raise InputError(f"'{self.path}' is damaged", ANEW) from None
+        whole = pa.concat_tables(tables)
+        return {name: whole[name].to_numpy() for name in names}
 
     def add(self, chunk: int, part: Part) -> None:
         """Keep a finished chunk."""

@@ -24,8 +24,9 @@ from flexspine.workers.local import LocalWorkers
 class Sweep:
     """A finished sweep: where it is, and what its rows amount to.
 
-    ``outcomes`` counts rows, ``strides`` those completed; ``digest`` is of all rows;
-    ``made`` tells how many of its chunks were made just now, in ``seconds``.
+    ``path`` is its directory. ``outcomes`` counts ``rows`` by outcome, ``strides`` is the number of
+    those completed; ``digest`` is of all rows; ``made`` tells how many of its chunks were made just
+    now, in ``seconds``.
     """
 
     path: Path
@@ -50,20 +51,20 @@ def sweep(
     *,
     processes: int = 1,
     client: Any = None,
-    progress: Callable[[int, int], None] = lambda _done, _all: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Do all that a plan asks for and keep the rows in the directory ``out``.
 
-    ``plan`` is one or the TOML file of one. Interrupted or killed, the same call goes on with the
-    same directory. ``processes`` are local; ``client`` is a Dask client, or a scheduler's address
-    such as ``tcp://host:8786``, in their place. ``progress`` is told how many points are done, and
-    of how many. Raises `InputError`, `MachineError` where workers fail, and `OSError` where the
-    disk does.
+    ``plan`` is a `Plan` or the path of its TOML file. Interrupted or killed, the same call goes on
+    with the same directory. ``processes`` are local; ``client`` is a Dask client, or a scheduler's
+    address such as ``tcp://host:8786``, in their place. ``progress`` is told how many points are
+    done, and of how many. Raises `InputError`, `MachineError` where workers fail, and `OSError`
+    where the disk does.
     """
     if not isinstance(plan, Plan | str | Path):
         raise InputError(f"{shortened(plan)} is no plan", "give one, or the path of a TOML file")
     plan = plan if isinstance(plan, Plan) else read_plan(plan)
-    begun = time.monotonic()
+    begun, tell = time.monotonic(), progress or (lambda _done, _whole: None)
     if not (Path(out) / MANIFEST).exists():
         check_task(plan)  # what was begun has been checked
     workers = min(check_count("processes", processes), plan.chunks)
@@ -72,11 +73,11 @@ def sweep(
         missing = [n for n in range(plan.chunks) if n not in store.finished]
         whole = plan.points * len(plan.models)
         done = whole - sum(plan.of_chunk(n)[2] for n in missing)
-        progress(done, whole)
+        tell(done, whole)
         for chunk, part in crew.map(do_chunk, ((n, (plan, n)) for n in missing)):
             store.add(chunk, part)
             done += plan.of_chunk(chunk)[2]
-            progress(done, whole)
+            tell(done, whole)
         found = store.finish()
     return Sweep(Path(out), plan, **found, made=len(missing), seconds=time.monotonic() - begun)
 
@@ -92,10 +93,11 @@ def crew_of(processes: int, client: Any) -> Crew:
 
 @dataclass(frozen=True)
 class Rerun:
-    """Whether a sweep came out the same: ``differing`` are chunks that did not, with their files,
-    ``missing`` those of a finished sweep that are no longer there.
+    """Whether a sweep came out the same a second time.
 
-    ``changed`` tells, by name, what it was made with and what that is now, where they differ.
+    ``chunks`` were compared, ``differing`` are those that came out otherwise, with their files,
+    ``missing`` those of a finished sweep that are no longer there. ``changed`` tells, by name, what
+    it was made with and what that is now, where they differ.
     """
 
     chunks: int
@@ -114,11 +116,12 @@ def rerun(
     *,
     processes: int = 1,
     client: Any = None,
-    progress: Callable[[int, int], None] = lambda _done, _all: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Rerun:
     """Repeat a sweep from its manifest and compare every chunk with what is there.
 
-    Nothing is written. An unfinished sweep is repeated as far as it got. Raises as `sweep`.
+    ``path`` is its directory. Nothing is written. An unfinished sweep is repeated as far as it got.
+    ``progress`` is told how many chunks are done, and of how many. Raises as `sweep`.
     """
     manifest, plan = read_manifest(Path(path)), read_plan_of(Path(path))
     store = Store(Path(path), plan)
@@ -131,7 +134,8 @@ def rerun(
         for count, (chunk, part) in enumerate(crew.map(do_chunk, jobs), start=1):
             if part.digest != digest_of(store.file(chunk)):
                 differing[chunk] = store.file(chunk)
-            progress(count, len(chunks))
+            if progress is not None:
+                progress(count, len(chunks))
     before, now = manifest["made_with"], made_with()
     changed = {n: (before.get(n, ""), v) for n, v in now.items() if before.get(n) != v}
     lost = set(range(plan.chunks)) - set(chunks) if manifest.get("finished") else set()

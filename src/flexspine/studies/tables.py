@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,11 @@ def landmarks_table(study: SpineStudy, damping: DampingStudy | None = None) -> l
             for p, why in zip((branch.points[0], branch.points[-1]), branch.ends, strict=True)
         ]
     return rows
+
+
+def known(value: float) -> float | None:
+    """Return a number as tables have it, None for NaN and infinities."""
+    return float(value) if isfinite(value) else None
 
 
 def published_readings() -> list[Row]:

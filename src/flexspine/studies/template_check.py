@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexspine.engines.bounder_mjcf import check_bounder
-from flexspine.engines.mujoco_bounder import BounderMotion, Contact, MujocoBounder
+from flexspine.engines.mujoco_bounder import BounderMotion, LegEvent, MujocoBounder
 from flexspine.errors import ParameterError, StateError
 from flexspine.gaits.measures import summarize
 from flexspine.hybrid.compile import Array
@@ -83,7 +83,10 @@ class TemplateStride:
 
 @dataclass(frozen=True)
 class TemplateCheck:
-    """One stride of ours, ``run``, and MuJoCo's ``strides`` at every level, the finest last."""
+    """One stride of a flexible bounder, ``model``, by our equations and by MuJoCo's.
+
+    ``run`` is ours, ``strides`` are MuJoCo's at every level, the finest last.
+    """
 
     model: Model
     run: Run
@@ -91,7 +94,11 @@ class TemplateCheck:
 
     @cached_property
     def differences(self) -> Array:
-        """What `Apart` tells, of all levels, shape (levels, 4)."""
+        """How far both are apart at most, at all levels, shape (levels, 4).
+
+        In the place of the CoM (m), the angle of a segment (rad), the time of a touchdown or
+        lift-off (s) and the peak force of a leg, as a share of the larger one of ours.
+        """
         return np.array([each.apart for each in self.strides])
 
     @cached_property
@@ -106,13 +113,13 @@ class TemplateCheck:
         return Apart(*np.polyfit(np.log(shares), np.log(self.differences), 1)[0].tolist())
 
     @cached_property
-    def contacts(self) -> tuple[Contact, ...]:
-        """Our touchdowns and lift-offs."""
+    def contacts(self) -> tuple[LegEvent, ...]:
+        """Our touchdowns and lift-offs, with their times in s."""
         return _contacts(self.run)
 
     @cached_property
     def peaks(self) -> Array:
-        """Our peak forces of the legs, in N, in the order of `SIDES`."""
+        """Our peak forces of the fore and the hind leg, in N, shape (2,)."""
         return _peaks(self.run)
 
     @property
@@ -136,14 +143,15 @@ def check_template(
     model: Model,
     levels: Sequence[Level] = LEVELS,
     *,
-    progress: Callable[[str], None] = lambda _name: None,
+    progress: Callable[[str], None] | None = None,
 ) -> TemplateCheck:
     """Compare one stride of a flexible bounder with MuJoCo's at every one of ``levels``.
 
-    The stride starts at the model's apex, which ought to be that of a gait. ``progress`` is told
-    what is done next. Raises `MachineError` without a MuJoCo that will do, `ParameterError` for
-    other models, actuators and levels that are not usable, and `StateError` if the model makes no
-    stride.
+    The stride starts at the model's apex, which ought to be that of a gait. A level is a time step
+    (s) and the mass of a toe as a share of the body's; both shrink from one to the next.
+    ``progress`` is told what is done next. Raises `MachineError` without a MuJoCo that will do,
+    `ParameterError` for other models, actuators and levels that are not usable, and `StateError` if
+    the model makes no stride.
     """
     check_bounder(model)
     levels = tuple(Level(*level) for level in levels)
@@ -153,14 +161,15 @@ def check_template(
             "these steps and shares of toes are not usable",
             f"give {ENOUGH} pairs or more, each smaller than the one before",
         )
-    progress("exact")
+    tell = progress or (lambda _what: None)
+    tell("exact")
     run = simulate(model)
     outcome = run.outcome
     if not outcome.completed:
         raise StateError(f"'{model.name}' makes no stride: {outcome.message}", outcome.advice)
     strides = []
     for level in levels:
-        progress(f"step {level.step * 1e3:.4g} ms, toes {level.share:.3g} of the body")
+        tell(f"step {level.step * 1e3:.4g} ms, toes {level.share:.3g} of the body")
         motion = MujocoBounder(model, *level).run(run.trajectory.duration)
         strides.append(TemplateStride(level, motion, _apart(run, motion)))
     return TemplateCheck(model, run, tuple(strides))
@@ -190,9 +199,9 @@ def _apart(run: Run, motion: BounderMotion) -> Apart:
     return Apart(place, angle, contact, peak)
 
 
-def _contacts(run: Run) -> tuple[Contact, ...]:
+def _contacts(run: Run) -> tuple[LegEvent, ...]:
     return tuple(
-        Contact(name, event.time)
+        LegEvent(name, event.time)
         for event in run.trajectory.events
         for name in event.names
         if name.endswith(("touchdown", "lift-off"))

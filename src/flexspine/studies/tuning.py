@@ -69,16 +69,18 @@ SLOWEST = 0.05
 
 
 class NoWalkError(FlexspineError):
-    """No walk lasts."""
+    """No walk lasts. Exit code 1."""
 
     code = "no_gait"
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """The best walk, its run and measures, its cost and the best one after every round.
+    """What a search for the numbers of a walk has found.
 
-    ``tried`` walks were tried, ``lasting`` of them did not fall.
+    ``walk`` is the best one, with its ``run``, its ``summary`` and its ``cost``; ``history`` are
+    the least costs after the first draws and after every round. ``tried`` walks were tried,
+    ``lasting`` of them did not fall.
     """
 
     walk: Walk
@@ -123,12 +125,16 @@ def tune(
     seed: int = 0,
     processes: int = 1,
     store: Path | None = None,
-    progress: Progress = lambda _what, _share: None,
+    progress: Progress | None = None,
 ) -> Tuning:
-    """Search for the numbers of a ``trot`` or ``bound`` at a speed (m/s); the same for one seed.
+    """Search for the numbers of a walk in space at a speed (m/s); the same for one seed.
 
-    ``store`` is a file that keeps what is tried; the same call goes on with it. Raises
-    `NoWalkError` if all fall, `ParameterError`, and `MachineError` without a MuJoCo that will do.
+    ``rhythm`` is ``trot`` or ``bound``. Walks last ``seconds`` (s); ``draws`` of them are drawn
+    over all ranges, and in each of some ``rounds`` so many ``children`` about the best ones.
+    ``store`` is a file that keeps what is tried; the same call goes on with it. ``processes`` share
+    the work without a change to the result. ``progress`` is told what is done and which share of
+    it, 0 to 1. Raises `NoWalkError` if all fall, `UnknownNameError`, `ParameterError`, and
+    `MachineError` without a MuJoCo that will do.
     """
     if rhythm not in RHYTHMS:
         raise UnknownNameError("rhythm", rhythm, RHYTHMS)

@@ -12,10 +12,9 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.simulation import check_count
 from flexspine.parameters import is_number, shortened
 from flexspine.studies.axes import GRID, Axis
-from flexspine.studies.basin import read_columns
 from flexspine.studies.plan import Plan
 from flexspine.studies.store import Store, read_plan_of
-from flexspine.studies.tables import Row
+from flexspine.studies.tables import Row, known
 from flexspine.studies.task_kinds import WALK_SECONDS, WALKS
 from flexspine.studies.walkers import Walker
 
@@ -51,8 +50,9 @@ def walk_plan(
 ) -> Plan:
     """Plan to let a robot walk at every stiffness (N m/rad) and asked speed (m/s).
 
-    The locked one walks as often at every speed, each time with another noise on its sensors.
-    Raises `ParameterError`.
+    The locked one walks as often at every speed, each time with another noise on its sensors, drawn
+    from ``seed``. Walks last ``seconds`` (s); without ``speeds`` they are shares of the walk's own,
+    0.6 to 1.6. `sweep` does the plan, `read_walks` reads what it found. Raises `ParameterError`.
     """
     if not isinstance(walker, Walker):
         raise ParameterError(
@@ -77,10 +77,12 @@ def walk_plan(
 
 @dataclass(frozen=True)
 class WalkMap:
-    """Walks over asked speeds (m/s) and stiffnesses (N m/rad), each (n,) and (m,).
+    """Walks in space of one robot, ``name``, over asked speeds and stiffnesses of its spine.
 
-    ``flexible`` and ``locked`` have by measure an array (n, m), NaN where the walk ended early;
-    those of the locked spine are as many repeats. ``fell`` counts early ends, by body, (n, m).
+    ``speeds`` (n,) are in m/s, ``stiffnesses`` (m,) in N m/rad. ``flexible`` and ``locked`` have by
+    measure an array (n, m), SI, NaN where the walk ended early; those of the locked spine are as
+    many repeats. ``fell`` tells which walks ended early, by body, (n, m). Walks have a ``rhythm``
+    and were to last ``seconds`` (s).
     """
 
     name: str
@@ -93,14 +95,14 @@ class WalkMap:
     fell: dict[str, Array]
 
     def rows(self) -> list[Row]:
-        """A row for every walk, None where there is no value."""
+        """Return a row for every walk, None where there is no value; SI."""
         return [
             {
                 "body": body,
                 "asked_speed": float(speed),
                 "spine_stiffness": float(stiffness) if body == "flexible" else None,
                 "fell": bool(self.fell[body][i, j]),
-                **{name: _known(table[name][i, j]) for name in MEASURES},
+                **{name: known(table[name][i, j]) for name in MEASURES},
             }
             for body, table in (("flexible", self.flexible), ("locked", self.locked))
             for i, speed in enumerate(self.speeds)
@@ -108,7 +110,10 @@ class WalkMap:
         ]
 
     def compared(self, measure: str) -> list[Row]:
-        """By speed: the mean of the locked spine, and the best stiffness with its value."""
+        """Return by speed the mean of the locked spine, and the best stiffness with its value.
+
+        ``measure`` is such as ``peak_normal``; least is best, of ``speed`` most.
+        """
         better = np.nanargmax if measure == "speed" else np.nanargmin
         found: list[Row] = []
         for i, speed in enumerate(self.speeds):
@@ -126,7 +131,11 @@ class WalkMap:
 
 
 def read_walks(path: str | Path) -> WalkMap:
-    """Read what a sweep of `walk_plan` has found. Raises `InputError`."""
+    """Read what a sweep of `walk_plan` has found.
+
+    ``path`` is the directory of the sweep. Raises `InputError` if it holds none, or an unfinished
+    one.
+    """
     folder = Path(path)
     plan = read_plan_of(folder)
     names = tuple(axis.name for axis in plan.axes)
@@ -138,7 +147,7 @@ def read_walks(path: str | Path) -> WalkMap:
     shape = (len(speeds), len(stiffnesses))
     tables, fell = [], []
     for number in range(2):
-        columns = read_columns(Store(folder, plan), number, ["outcome", *MEASURES])
+        columns = Store(folder, plan).columns(number, ["outcome", *MEASURES])
         tables.append({name: columns[name].astype(float).reshape(shape) for name in MEASURES})
         fell.append((columns["outcome"] != "completed").reshape(shape))
     walker = plan.walkers[0]
@@ -152,7 +161,3 @@ def read_walks(path: str | Path) -> WalkMap:
         locked=tables[1],
         fell={"flexible": fell[0], "locked": fell[1]},
     )
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -27,7 +27,7 @@ _PARTS = ("spine",)
 
 @dataclass(frozen=True)
 class Walker:
-    """A robot and how it walks."""
+    """A robot and how it walks in space, as what a sweep varies; ``name`` is that of its rows."""
 
     name: str
     robot: Robot
@@ -35,11 +35,14 @@ class Walker:
 
     @cached_property
     def numbers(self) -> dict[str, float]:
-        """All numbers by dotted name."""
+        """All numbers of the robot and of its walk, by dotted name, SI."""
         return {**self.robot.numbers, **values(self.walk.gains)}
 
     def with_values(self, changes: Mapping[str, float]) -> Walker:
-        """The same with some numbers changed. Raises `UnknownNameError` and `ParameterError`."""
+        """Return the same with some numbers changed, by dotted name.
+
+        Raises `UnknownNameError` and `ParameterError`.
+        """
         own = {name: value for name, value in changes.items() if not name.startswith(OF_WALKS)}
         rest = {name: value for name, value in changes.items() if name not in own}
         robot = self.robot.with_values(own) if own else self.robot
@@ -47,7 +50,10 @@ class Walker:
         return Walker(self.name, robot, walk)
 
     def with_locked_spine(self) -> Walker:
-        """The same with its spine locked straight. Raises `ParameterError` if it has none."""
+        """Return the same with its spine locked straight.
+
+        Raises `ParameterError` if it has none.
+        """
         robot = locked(self.robot, spine_of(self.robot))
         return Walker(f"{self.name}-locked", robot, self.walk)
 
@@ -56,7 +62,10 @@ class Walker:
         self.walk.pattern(SpaceRobot(self.robot).legs)
 
     def row(self, seconds: float, sensing: float, seed: int) -> dict[str, Any]:
-        """Let it walk, and return what came of it by column."""
+        """Let it walk for some seconds, and return what came of it by column.
+
+        ``sensing`` (rad) is how far joints are read off at most, drawn from ``seed``.
+        """
         try:
             run = run_in_space(self.robot, self.walk, seconds, sensing=sensing, seed=seed)
         except InputError as failure:
@@ -68,7 +77,7 @@ class Walker:
         return {**told, "duration": run.duration, **measures, "spine": bend}
 
     def record(self) -> dict[str, Any]:
-        """All of it as JSON, from which it can be made again."""
+        """Return all of it as JSON, from which it can be made again."""
         robot = self.robot
         return {
             "name": self.name,

@@ -19,7 +19,7 @@ from flexspine.hybrid.compile import Array
 from flexspine.models.ground import BEGINS, Ground
 from flexspine.models.model import Model, check_between
 from flexspine.models.simulation import check_count
-from flexspine.studies.robustness import about, check_runs
+from flexspine.studies.robustness import check_runs, counting
 from flexspine.workers.lasting import do_all
 
 # Runs that are done, and kept, together.
@@ -36,8 +36,9 @@ RESERVE = 1.5
 class Terrain:
     """A kind of ground with its numbers, from which ground is made for each seed.
 
-    ``kind`` is step, stairs, ramp, slope, waves, rough, blocks or the path of a CSV file. The seed
-    draws what is random, and where within a stride it begins; a file is as it is.
+    ``kind`` is ``step``, ``stairs``, ``ramp``, ``slope``, ``waves``, ``rough``, ``blocks`` or the
+    path of a CSV file; ``numbers`` are those of the method of `Ground` of that name, by name. The
+    seed draws what is random, and where within a stride it begins; a file is as it is.
     """
 
     kind: str
@@ -70,7 +71,10 @@ class Terrain:
         return {**known, **self.numbers}
 
     def ground(self, seed: int, stride: float, strides: int) -> Ground:
-        """The ground for a seed, strides of ``stride`` m. Raises `InputError`."""
+        """Return ground for a seed, long enough for ``strides`` strides of ``stride`` m.
+
+        Raises `InputError`.
+        """
         if self.track is not None:
             return self.track
         given: dict[str, Any] = {**self.all_numbers}
@@ -99,7 +103,10 @@ NO_LENGTHS = ("degrees", "count")
 
 @dataclass(frozen=True)
 class Wayfaring:
-    """Many runs over ground of one kind, each of its own seed."""
+    """Many runs over ground of one kind, each of its own seed from ``first_seed`` on.
+
+    ``strides`` were to be made; the ``fates`` of the runs are in the order of the seeds.
+    """
 
     terrain: Terrain
     strides: int
@@ -113,17 +120,17 @@ class Wayfaring:
 
     @property
     def arrived(self) -> int:
-        """How many made all strides."""
+        """How many runs made all strides."""
         return sum(fate.survived for fate in self.fates)
 
     @property
     def outcomes(self) -> dict[str, int]:
-        """How many ended how."""
+        """How many runs ended with each outcome."""
         names = [fate.outcome for fate in self.fates]
         return {name: names.count(name) for name in sorted(set(names))}
 
     def going(self) -> tuple[Array, Array]:
-        """The share of runs that are still going after some distances (m), each shape (k,).
+        """Return distances (m) and the share of runs still going after each, shape (k,) both.
 
         Kaplan and Meier's estimate (1958, J Am Stat Assoc 53:457-481): runs that made all their
         strides say nothing about what lies beyond.
@@ -133,13 +140,13 @@ class Wayfaring:
         return found.quantiles, found.probabilities
 
     def quantile(self, share: float) -> float | None:
-        """The distance (m) by which this share of runs ended early; None if none did so far."""
+        """Return the distance (m) by which a share of runs ended early; None if none did."""
         distances, going = self.going()
         there = np.flatnonzero(going <= 1 - share + ROUNDING)
         return float(distances[there[0]]) if there.size else None
 
     def metres_per_fall(self) -> float | None:
-        """All distance over all runs that ended early, in m; None without any."""
+        """Return all distance over all runs that ended early, in m; None without any."""
         falls = len(self.fates) - self.arrived
         return float(self.distances.sum()) / falls if falls else None
 
@@ -178,12 +185,14 @@ def distance_to_fall(
     seed: int = 0,
     processes: int = 1,
     store: Path | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _whole: None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Wayfaring:
     """Run ``runs`` times over ground of seeds ``seed``, ``seed + 1``, ... for up to ``strides``.
 
-    ``store`` is a file that keeps what is done; the same call goes on from there. ``processes``
-    share the work without a change to results. Raises `InputError`.
+    ``steering`` is a controller, such as `stabilize` designs; ``stride`` is the length (m) of an
+    undisturbed stride. ``store`` is a file that keeps what is done; the same call goes on from
+    there. ``processes`` share the work without a change to results. ``progress`` is told how many
+    runs are done, and of how many. Raises `InputError`.
     """
     check_runs(runs)
     check_count("strides", strides)
@@ -204,11 +213,11 @@ def distance_to_fall(
         _run_piece,
         pieces,
         processes=check_count("processes", processes),
-        progress=lambda count, of: progress(runs * count // of, runs),
+        progress=counting(progress, runs),
         store=store,
         description={
             "kind": terrain.kind, "numbers": dict(terrain.numbers), "runs": runs,
-            "strides": strides, "seed": seed, "animal": {**about(model), **steering.settings},
+            "strides": strides, "seed": seed, "animal": {**model.record(), **steering.settings},
         },
         to_json=list,
         from_json=lambda rows: [Fate(*row) for row in rows],

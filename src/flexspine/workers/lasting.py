@@ -19,7 +19,7 @@ def do_all(
     pieces: Sequence[Piece],
     *,
     processes: int,
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], None] | None,
     store: Path | None,
     description: Mapping[str, Any],
     to_json: Callable[[Result], Any],
@@ -39,13 +39,14 @@ def do_all(
     def jobs() -> Iterator[tuple[int, Piece]]:
         return ((number, piece) for number, piece in enumerate(pieces) if number not in done)
 
-    progress(len(done), len(pieces))
+    tell = progress or (lambda _done, _whole: None)
+    tell(len(done), len(pieces))
     with LocalWorkers(processes) as crew:
         for number, result in crew.map(function, jobs()):
             done[number] = result
             if journal is not None:
                 journal.add({"piece": number, "result": to_json(result)})
-            progress(len(done), len(pieces))
+            tell(len(done), len(pieces))
     return [done[number] for number in range(len(pieces))]
 
 
