@@ -22,8 +22,8 @@ test: $(VENV)/.installed-dev
 
 # Runs its examples and pages of code; fails on any warning, such as a broken link.
 docs: $(VENV)/.installed-dev
-	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
-	$(BIN)/sphinx-build -W --keep-going -q -b doctest docs docs/_build/doctest
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/read docs docs/_build/html
+	$(BIN)/sphinx-build -W --keep-going -q -b doctest -d docs/_build/read docs docs/_build/doctest
 	@echo "Open docs/_build/html/index.html"
 
 bench: $(VENV)/.installed-dev
@@ -37,6 +37,7 @@ pictures: $(VENV)/.installed
 	$(BIN)/flexspine map --out $(OUT)/pictures/map
 	$(BIN)/flexspine trot --seconds 3.2 --out $(OUT)/pictures/trot
 	mkdir -p docs/images
+	$(BIN)/python -c "from flexspine import load_robot, plot_coordinates as p; p(load_robot('sc618')).savefig('docs/images/sc618_coordinates.png')"
 	cp $(OUT)/pictures/figure.png $(OUT)/pictures/strip.png $(OUT)/pictures/animation.gif docs/images/
 	cp $(OUT)/pictures/study/peak_grf_over_speed.png $(OUT)/pictures/study/damping.png docs/images/
 	cp $(OUT)/pictures/trot/figure.png docs/images/trot.png

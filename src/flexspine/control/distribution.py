@@ -202,6 +202,12 @@ def force_family(
     ``accelerations`` have shape (N,), in the order of the linkage, SI; without the latter two the
     robot is at rest. ``locked`` joints hold themselves. Raises `UnknownNameError` for a foot or a
     joint that is not there.
+
+    >>> from flexspine import force_family, load_robot, standing
+    >>> robot = load_robot("sc618")
+    >>> family = force_family(robot.linkage, standing(robot, 0.33), [*robot.feet])
+    >>> family.dimension
+    4
     """
     known = [foot.name for foot in linkage.feet]
     for foot in feet:

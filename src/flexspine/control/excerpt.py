@@ -12,7 +12,7 @@ from flexspine.hybrid.integrate import integrate
 SHOWN = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Excerpt(SteeredRun):
     """Strides from ``first`` to ``last``, counted from 1, of a run that made ``made``.
 

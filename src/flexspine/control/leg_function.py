@@ -65,14 +65,14 @@ class LegFunction:
         return self._measures | dict(zip(self._inputs, numbers, strict=True))
 
 
-def standing(robot: Robot, height: float, ahead: Mapping[str, float]) -> Array:
+def standing(robot: Robot, height: float, ahead: Mapping[str, float] | None = None) -> Array:
     """Return the coordinates ``q`` of a robot that stands with its hips at ``height`` (m).
 
     Shape (N,), in the order of its linkage, SI. Feet are on level ground below their hips, or
     ``ahead`` of them by so many m, by leg. Raises `ParameterError` for a robot without legs to
     stand on, and for feet that are out of reach.
     """
-    legs = legs_of(robot)
+    legs, ahead = legs_of(robot), ahead or {}
     for name, leg in legs.items():
         off, folded = ahead.get(name, 0.0), abs(leg.thigh_length - leg.shank_length)
         if not folded < hypot(height, off) < leg.reach:

@@ -149,6 +149,12 @@ def stabilize(
     times what steering takes, in natural units, or ``deadbeat``, which is done in as few strides as
     can be. Raises `UnknownNameError`, `ParameterError` for what cannot be asked for, and
     `FlexspineError` for a gait that cannot be stabilised so.
+
+    >>> from flexspine import examine, load_model, stabilize
+    >>> gait = examine(load_model("kamimura2015-flexible"))
+    >>> feedback = stabilize(gait, twice=True)
+    >>> f"{feedback.level_spectral_radius:.2f}"
+    '0.64'
     """
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)

@@ -220,7 +220,7 @@ def _between(bound: BoundSystem, point: HybridState) -> HybridState | Outcome | 
     return bound.steer(point, between=True) if bound.alone(point) else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SteeredRun(Run):
     """A `Run` under a controller, ``steering``; ``model`` is where it began.
 

@@ -79,6 +79,13 @@ def trot(
     ``tolerance`` is the integrator's, between 1e-17 and 1e-3. A run that falls is no error: look at
     ``outcome``. ``progress`` is told the share that is done, 0 to 1. Raises `ParameterError` and
     `UnknownNameError` for what cannot be asked for, and for a robot that has no legs to trot on.
+
+    >>> from flexspine import Trot, load_robot, summarize_walk, trot
+    >>> run = trot(load_robot("sc618"), Trot(seconds=3))
+    >>> run
+    <RobotRun of sc618: 3 s, completed>
+    >>> f"{summarize_walk(run).speed:.2f} m/s"
+    '0.30 m/s'
     """
     asked = Trot() if wanted is None else wanted
     drive = driven(robot, asked)

@@ -63,7 +63,7 @@ def standing_start(space: SpaceRobot, height: float | None = None) -> Start:
     """The robot on its feet, hips at a ``height`` (m) above the lowest points of its feet."""
     if height is None:
         height = STANDING * min(leg.reach for leg in space.legs.values())
-    return Start.of(space, standing(space.robot, height, {}))
+    return Start.of(space, standing(space.robot, height))
 
 
 def specification(

@@ -7,7 +7,7 @@ A computer reads the joints' angles some hundred times a second, chooses torques
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, isfinite
 from typing import Any
@@ -53,7 +53,11 @@ class SpaceRun:
     outcome: Outcome
     settings: dict[str, Any]
     laws: dict[str, ContactLaw]
-    samples: dict[str, Array] = field(repr=False)
+    samples: dict[str, Array]
+
+    def __repr__(self) -> str:
+        told = f"{self.duration:.4g} s, {self.outcome.name}"
+        return f"<SpaceRun of {self.robot.name}, {self.walk.name}: {told}>"
 
     @property
     def robot(self) -> Robot:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,16 @@ class Branch:
     """
 
     over: str
-    family: Family = field(repr=False)
+    family: Family
     points: tuple[BranchPoint, ...]
     landmarks: tuple[Landmark, ...]
     ends: tuple[str, str]
+
+    def __repr__(self) -> str:
+        values = [point.value for point in self.points]
+        span = f" from {values[0]:.4g} to {values[-1]:.4g}" if values else ""
+        told = f"{len(self.points)} gaits, {len(self.landmarks)} landmarks"
+        return f"<Branch over {self.over}{span}: {told}>"
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -90,6 +96,18 @@ def trace_branch(
     a file that keeps every step; traced again with the same arguments, the branch goes on from
     there. ``progress`` is told every point. SI and radians. By pseudo-arclength: Keller 1977.
     Raises `UnknownNameError`, `ParameterError`, `OutputError`.
+
+    >>> from flexspine import examine, load_model, trace_branch
+    >>> gait = examine(load_model("kamimura2015-rigid"))
+    >>> branch = trace_branch(gait, bounds=(4.1, 5.0))
+    >>> [f"{point.gait.period:.4f} s" for point in branch.at(4.25)]
+    ['0.5846 s']
+    >>> for landmark in branch.landmarks:
+    ...     print(f"{landmark.kind} at {landmark.value:.3f} m/s")
+    contact order at 4.580 m/s
+    Neimark-Sacker at 4.593 m/s
+    fold at 4.595 m/s
+    no flight at the apex at 4.595 m/s
     """
     family = family_of(gait, over, fixed, symmetric, free)
     tracer = Tracer(family, bounds, longest_step, most_points)

@@ -46,6 +46,10 @@ class Gait:
     trajectory: Trajectory
     tolerance: float
 
+    def __repr__(self) -> str:
+        told = f"{self.period:.4g} s, {self.mean_speed:.4g} m/s, {'-'.join(self.phases)}"
+        return f"<Gait of {self.model.name}: {told}>"
+
     def __reduce__(self) -> tuple[Any, ...]:
         """What goes to another process: how to run it anew."""
         return _examined_anew, (self.model, self.strides, self.tolerance)
@@ -249,6 +253,15 @@ def examine(model: Model, *, strides: int = 1, tolerance: float = DEFAULT_TOLERA
 
     ``strides`` make the period, ``tolerance`` is the integrator's, between 1e-17 and 1e-3. Raises
     `ParameterError` for what is not usable, and for ground that is not flat.
+
+    >>> from flexspine import examine, load_model
+    >>> gait = examine(load_model("kamimura2015-flexible"))
+    >>> gait
+    <Gait of kamimura2015-flexible: 0.2527 s, 4.5 m/s, DF-FS-DF-HS-DF>
+    >>> gait.residual < 1e-9
+    True
+    >>> examine(load_model("kamimura2015-flexible", apex={"height": 0.33})).flaw
+    'misses its start by 1.5e-01 (natural units)'
     """
     model.on_flat_ground("a gait")
     check_count("strides", strides)

@@ -33,6 +33,9 @@ class ReturnMap:
     time: Array
     crossing_rates: tuple[float, ...]
 
+    def __repr__(self) -> str:
+        return f"<ReturnMap, derivative of shape {self.states.shape}: {self.trajectory!r}>"
+
     @property
     def start(self) -> Array:
         """The section coordinates at the start, shape (d,)."""
@@ -91,6 +94,11 @@ def stride_map(
     of ``model.apex`` and then these. SI and radians. ``tolerance`` is the integrator's. Exact, by
     variational equations and saltation (Leine & Nijmeijer 2004). Raises `UnknownNameError`, and
     `ParameterError` for a run that does not come back.
+
+    >>> from flexspine import load_model, stride_map
+    >>> linear = stride_map(load_model("slip"), parameters=["touchdown.fore"])
+    >>> linear.by_state.shape, linear.by_parameters.shape
+    ((4, 4), (4, 1))
     """
     model.on_flat_ground("the derivative of a stride")
     names = model.parameter_names

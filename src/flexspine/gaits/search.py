@@ -52,6 +52,9 @@ class Search:
     tally: Mapping[str, int]
     dropped: Mapping[str, int]
 
+    def __repr__(self) -> str:
+        return f"<Search: {len(self)} gaits from {self.advice}>"
+
     def __iter__(self) -> Iterator[Gait]:
         return iter(self.gaits)
 
@@ -96,6 +99,15 @@ def find_gaits(
     low and high by name. SI and radians. The same seed finds the same gaits. ``progress`` is told
     the share that is done, 0 to 1. Raises `UnknownNameError`, and `ParameterError` where the fixed
     quantities do not single out isolated gaits.
+
+    >>> from flexspine import find_gaits, load_model
+    >>> model = load_model("kamimura2015-rigid")
+    >>> fixed = {"energy": 290, "height": 0.32, "mean_speed": 4.5}
+    >>> search = find_gaits(model, fixed, symmetric=True, starts=20)
+    >>> for gait in search:
+    ...     print(gait.family, f"{gait.period:.4f} s")
+    fore-first DF-FS-DF-HS-DF 0.3908 s
+    hind-first DF-HS-DF-FS-DF 0.3911 s
     """
     wanted = _own_values(model, tolerance) if fixed is None else dict(fixed)
     ranges = {**(bounds or {}), **(free or {})}

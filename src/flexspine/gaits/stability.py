@@ -45,6 +45,11 @@ class Stability:
     energy_gradient: Array | None
     crossing_rates: tuple[float, ...]
 
+    def __repr__(self) -> str:
+        largest = ", ".join(f"{number:.4g}" for number in self.multipliers)
+        word = "stable" if self.stable else "unstable"
+        return f"<Stability: {word}, multipliers {largest}>"
+
     @property
     def errors(self) -> Array:
         """Error bar of each multiplier, to first order in the Jacobian's error."""
@@ -96,6 +101,11 @@ def floquet_multipliers(gait: Gait, linear: ReturnMap | None = None) -> Stabilit
     Variational equations between events, saltation at them (Leine & Nijmeijer 2004). Touchdown
     angles are held fixed. ``linear`` spares linearising its trajectory anew. Raises
     `ParameterError` for what is no gait.
+
+    >>> from flexspine import examine, floquet_multipliers, load_model
+    >>> stability = floquet_multipliers(examine(load_model("kamimura2015-flexible")))
+    >>> f"{stability.level_spectral_radius:.4f}", stability.stable
+    ('1.3278', False)
     """
     if gait.flaw is not None:
         raise ParameterError(

@@ -100,6 +100,10 @@ class Trajectory:
     steps: int
     outcome: Outcome
 
+    def __repr__(self) -> str:
+        told = f"{self.duration:.4g} s, {len(self.events)} events, {self.outcome.name}"
+        return f"<Trajectory: {told}>"
+
     @cached_property
     def modes(self) -> tuple[str, ...]:
         """The modes in the order in which they were lived through."""

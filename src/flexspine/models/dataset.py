@@ -160,6 +160,12 @@ def to_dataset(
     ``event_kind``; ground that is not flat along ``ground``. Attributes carry parameters, versions,
     tolerance and outcome. A run that ended at its first instant has one sample at most. Raises
     `ParameterError` for times that are not usable.
+
+    >>> from flexspine import load_model, simulate, to_dataset
+    >>> data = to_dataset(simulate(load_model("kamimura2015-flexible")))
+    >>> force = data["fore_grf"]
+    >>> f"{force.max().item():.1f} {force.units}"
+    '530.5 N'
     """
     import xarray as xr
 

@@ -117,6 +117,11 @@ def simulate_many(
     save that a body that starts in the ground has fallen there. ``processes`` share the work
     without a change to the results; ``progress`` is told the share that is done, 0 to 1. Raises
     `UnknownNameError` and `ParameterError`.
+
+    >>> from flexspine import load_model, simulate_many
+    >>> runs = simulate_many(load_model("slip"), {"height": [0.9, 1.0, 1.1]}, strides=5)
+    >>> runs["strides"]
+    array([0, 1, 3])
     """
     for given in (states, parameters):
         if not (given is None or isinstance(given, Mapping)):

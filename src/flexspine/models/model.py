@@ -96,6 +96,10 @@ class Model:
             plain = {key: float(value) for key, value in getattr(self, name).items()}
             object.__setattr__(self, name, plain)
 
+    def __repr__(self) -> str:
+        where = "" if self.ground is None else f" on {self.ground.name}"
+        return f"<Model {self.name}: {self.kind.name}{where}>"
+
     def __getstate__(self) -> dict[str, Any]:
         """What goes to another process: the fields, not what was made of them."""
         return {each.name: getattr(self, each.name) for each in fields(self)}

@@ -36,6 +36,11 @@ def load_model(
     ``parameters`` by dotted name (``{"spine.stiffness": 240}``), ``apex`` by section coordinate
     such as ``height``, ``touchdown`` by leg (``fore``, ``hind``); SI and radians. Raises
     `UnknownNameError`, `PresetError`, `ParameterError`.
+
+    >>> from flexspine import load_model
+    >>> model = load_model("kamimura2015-flexible", {"spine.stiffness": 240}, apex={"height": 0.33})
+    >>> model.parameters.spine.stiffness, model.apex["height"]
+    (240.0, 0.33)
     """
     model = _load(str(preset), ())
     return model.with_values(parameters, apex=apex, touchdown=touchdown)

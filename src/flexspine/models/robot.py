@@ -115,6 +115,10 @@ class Robot:
     source: Source
     legs: Mapping[str, LegParts] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        told = f"{len(self.parents)} links, {len(self.motors)} motors, {len(self.feet)} feet"
+        return f"<Robot {self.name}: {told}>"
+
     @cached_property
     def linkage(self) -> Linkage:
         """The mechanism: kinematics and the terms of its equations of motion."""

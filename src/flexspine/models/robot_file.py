@@ -36,6 +36,10 @@ def load_robot(robot: str | Path, parameters: Mapping[str, Any] | None = None) -
 
     ``parameters`` are numbers to change, by dotted name (``{"spine.stiffness": 300}``); SI and
     radians. Raises `UnknownNameError`, `PresetError` and `ParameterError`.
+
+    >>> from flexspine import load_robot
+    >>> load_robot("sc618", {"spine.stiffness": 300})
+    <Robot sc618: 10 links, 8 motors, 4 feet>
     """
     name = str(robot)
     content = read_named(name, "robot", FOLDER)

@@ -70,6 +70,10 @@ class RobotRun:
     tolerance: float
     settings: dict[str, Any]
 
+    def __repr__(self) -> str:
+        told = f"{self.trajectory.duration:.4g} s, {self.outcome.name}"
+        return f"<RobotRun of {self.robot.name}: {told}>"
+
     @property
     def robot(self) -> Robot:
         """What ran."""

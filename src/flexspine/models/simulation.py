@@ -38,6 +38,10 @@ class Run:
     trajectory: Trajectory
     tolerance: float
 
+    def __repr__(self) -> str:
+        told = f"{self.trajectory.duration:.4g} s, {self.outcome.name}"
+        return f"<{type(self).__name__} of {self.model.name}: {told}>"
+
     @property
     def outcome(self) -> Outcome:
         """How the run ended."""
@@ -92,6 +96,13 @@ def simulate(
     between 1e-17 and 1e-3; ``max_steps`` bounds the Taylor steps of one stride. A run that falls or
     gets stuck is no error: look at ``outcome``. Raises `UnknownNameError`, `ParameterError`, and
     `StateError` for a start in the ground or with a leg that would pull.
+
+    >>> from flexspine import load_model, simulate
+    >>> run = simulate(load_model("kamimura2015-flexible"))
+    >>> run
+    <Run of kamimura2015-flexible: 0.2527 s, completed>
+    >>> run.phases
+    ('DF', 'FS', 'DF', 'HS', 'DF')
     """
     if strides is not None and duration is not None:
         raise ParameterError("both strides and duration are given", "give one of them")
