@@ -9,6 +9,9 @@ __version__ = "0.1.0"
 
 SCHEMA_VERSION = 1
 
+# What every record begins with.
+STAMP = {"schema_version": SCHEMA_VERSION, "flexspine": __version__}
+
 
 def check_schema(record: Mapping[str, Any], where: str) -> None:
     """Raise `InputError` for a record of a form that this version would misread.

@@ -16,6 +16,7 @@ from tests.cli.conftest import Cli
 
 FIELDS = {
     "schema_version",
+    "flexspine",
     "outcome",
     "message",
     "phases",

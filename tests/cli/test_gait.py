@@ -15,6 +15,7 @@ from tests.cli.conftest import COMMAND, Cli, Result, run_here
 
 FIELDS = {
     "schema_version",
+    "flexspine",
     "apex",
     "touchdown_angles",
     "liftoff_angles",

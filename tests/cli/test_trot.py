@@ -12,7 +12,7 @@ import xarray as xr
 from tests.cli.conftest import Cli, run_here
 
 FIELDS = {
-    "schema_version", "robot", "outcome", "message", "advice", "duration", "settings", "spine",
+    "schema_version", "flexspine", "robot", "outcome", "message", "advice", "duration", "settings", "spine",
     "measures", "tolerance",
 }  # fmt: skip
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Assignments, Json, Processes, Scheduler, output_directory
@@ -203,8 +203,7 @@ def _record(basins: Sequence[Basin], done: Sweep) -> dict[str, Any]:
 
     first = basins[0]
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "over": {axis.name: axis.within for axis in free_axes(done.plan.axes)},
         "strides": first.wanted,
         "energy_kept": first.energy_kept,

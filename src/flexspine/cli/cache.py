@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.cli.options import Json
 from flexspine.cli.output import print_json
 
@@ -24,9 +24,7 @@ def clear(json: Json = False) -> None:
 
     directory, freed = clear_cache()
     if json:
-        print_json(
-            {"schema_version": SCHEMA_VERSION, "directory": str(directory), "freed_bytes": freed}
-        )
+        print_json({**STAMP, "directory": str(directory), "freed_bytes": freed})
     else:
         print(f"cleared {directory} ({freed / 1e6:.1f} MB)")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
 from flexspine.cli.output import print_json, steps
@@ -38,8 +38,7 @@ def doctor(json: Json = False) -> int:
     if json:
         print_json(
             {
-                "schema_version": SCHEMA_VERSION,
-                "flexspine": __version__,
+                **STAMP,
                 "works": works,
                 "checks": [vars(check) for check in found],
             }

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
@@ -81,7 +81,7 @@ def equations(
     if json:
         print_json(
             {
-                "schema_version": SCHEMA_VERSION,
+                **STAMP,
                 "model": kind.name,
                 "phase": phase.value,
                 "letters": letters,

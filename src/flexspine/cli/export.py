@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
@@ -102,8 +102,7 @@ def mjcf(
         told = {"mjcf": text} if out is None else {"file": str(out), "bytes": len(text.encode())}
         print_json(
             {
-                "schema_version": SCHEMA_VERSION,
-                "flexspine": __version__,
+                **STAMP,
                 "robot": body.name,
                 **told,
             }

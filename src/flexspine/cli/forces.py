@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
@@ -157,7 +157,7 @@ def _record(
     ranges = [family.normal_range(i, robot.friction) for i in range(len(feet))]
     forces, torques = chosen.forces, chosen.torques
     return {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "robot": robot.name,
         "feet": feet,
         "verdict": chosen.verdict.value,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
@@ -129,7 +129,7 @@ def gait(
             progress=progress.at,
         )
         record = {
-            "schema_version": SCHEMA_VERSION,
+            **STAMP,
             "preset": model.name,
             "fixed": fixed,
             "free": list(freed),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.basin import Out, how_made, keep_beside
 from flexspine.cli.options import (
     DEFAULT_PRESET,
@@ -102,8 +102,7 @@ def gait_map(
 
 def _record(found: GaitMap, done: Sweep) -> dict[str, Any]:
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "preset": found.model.name,
         "apex": dict(found.model.apex),
         "touchdown_angles": dict(found.model.touchdown),

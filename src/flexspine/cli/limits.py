@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.kept import kept
@@ -105,8 +105,7 @@ def limits(
                 progress=count,
             )
         record = {
-            "schema_version": SCHEMA_VERSION,
-            "flexspine": __version__,
+            **STAMP,
             "preset": start.model.name,
             "energy": start.energy,
             "height": start.model.apex["height"],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
@@ -63,7 +63,7 @@ def presets(
         progress.begin("reading")
         record = _everything() if name is None else _details(name)
     if json:
-        print_json({"schema_version": SCHEMA_VERSION, **record})
+        print_json({**STAMP, **record})
     elif name is None:
         _print_list(record)
     else:

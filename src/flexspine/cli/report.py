@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json
 from flexspine.cli.output import print_json, steps
@@ -48,7 +48,7 @@ def report(
     size = file.stat().st_size
     if json:
         record = {"file": str(file), "bytes": size}
-        print_json({"schema_version": SCHEMA_VERSION, "flexspine": __version__, **record})
+        print_json({**STAMP, **record})
     else:
         print(f"{file} ({size / 1e6:.1f} MB)")
     return 0

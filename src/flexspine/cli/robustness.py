@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.kept import kept
@@ -160,8 +160,7 @@ def _record(found: Robustness, animals: dict[str, Stabilizer]) -> dict[str, Any]
     from flexspine.control.steered_record import stabilizer_record
 
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "disturbance": found.kind.name,
         "about": found.kind.about,
         "unit": found.kind.unit,

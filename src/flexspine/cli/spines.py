@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.basin import Out, how_made, keep_beside
 from flexspine.cli.options import (
     DEFAULT_ROBOT,
@@ -98,8 +98,7 @@ def _record(found: WalkMap, done: Sweep) -> dict[str, Any]:
     from flexspine.studies.walk_map import MEASURES
 
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "robot": found.name,
         "rhythm": found.rhythm,
         "seconds": found.seconds,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json, check_number, output_directory, span
 from flexspine.cli.output import Steps, print_json, steps
@@ -218,8 +218,7 @@ def _file(name: str) -> str:
 def _record(result: SpineStudy, damping: DampingStudy, judged: list[Verdict]) -> dict[str, Any]:
     setting = result.setting
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "setting": {
             "energy": setting.energy,
             "height": setting.height,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import Json, Processes, Scheduler, output_directory
 from flexspine.cli.output import counting, print_json
@@ -92,8 +92,7 @@ def rerun(
     if json:
         print_json(
             {
-                "schema_version": SCHEMA_VERSION,
-                "flexspine": __version__,
+                **STAMP,
                 "same": found.same,
                 "chunks": found.chunks,
                 "differing": list(found.differing),
@@ -139,8 +138,7 @@ def unfinished_is_kept(out: Path) -> Iterator[None]:
 
 def _record(done: Sweep) -> dict[str, object]:
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "out": str(done.path),
         "task": done.plan.task,
         "models": [model.name for model in done.plan.models],

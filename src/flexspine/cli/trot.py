@@ -242,11 +242,11 @@ def _write_comparison(stage: Path, found: SpineComparison, progress: Steps) -> N
 
 
 def _comparison_record(found: SpineComparison) -> dict[str, Any]:
-    from flexspine._version import SCHEMA_VERSION
+    from flexspine._version import STAMP
     from flexspine.control.walk_record import walk_record
 
     return {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "runs": {
             f"{controller} {body}": walk_record(run, found.summaries[controller, body])
             for (controller, body), run in found.runs.items()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.kept import kept
 from flexspine.cli.options import (
@@ -122,8 +122,7 @@ def _record(found: Tuning, speed: float, seed: int) -> dict[str, Any]:
     from flexspine.engines.space_measures import space_record
 
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "wanted_speed": speed,
         "seed": seed,
         "cost": found.cost,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli import completion
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
@@ -137,8 +137,7 @@ def _record(check: PinnedCheck) -> dict[str, Any]:
     from flexspine.studies.pinned_check import ALLOWED, COMPARED, ORDERS
 
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "mujoco": mujoco_version(),
         "robot": check.robot.name,
         "foot": check.foot,

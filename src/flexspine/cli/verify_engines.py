@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.cli.interrupts import interruptible
 from flexspine.cli.options import (
     DEFAULT_PRESET,
@@ -97,8 +97,7 @@ def _record(pinned: PinnedCheck, replay: ReplayCheck, template: TemplateCheck) -
     from flexspine.studies.template_check import ALLOWED as ALLOWED_TEMPLATE
 
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "mujoco": mujoco_version(),
         "agrees": pinned.agrees and replay.agrees and template.agrees,
         "pinned": {

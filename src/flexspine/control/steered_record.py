@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.control.stabilize import Stabilizer
 from flexspine.control.steering import Fixed, SteeredRun
 from flexspine.gaits.gait import Gait
@@ -69,7 +69,7 @@ def steered_record(
     distance = float(end.states[0] - start.states[0])
     rows = apex_table(run, gait)
     record = {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         **(_gait_record(gait) if stabilizer is None else stabilizer_record(stabilizer)),
         "noise": asdict(run.noise),
         "seed": run.seed,

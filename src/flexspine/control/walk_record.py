@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.control.walk_measures import WalkSummary
 from flexspine.gaits.record import finite
 from flexspine.models.robot_run import RobotRun
@@ -14,7 +14,7 @@ from flexspine.models.robot_run import RobotRun
 def walk_record(run: RobotRun, summary: WalkSummary) -> dict[str, Any]:
     """Return outcome, settings and measures, in SI units; None where there is no value."""
     return {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "robot": run.robot.name,
         "outcome": run.outcome.name,
         "message": run.outcome.message,

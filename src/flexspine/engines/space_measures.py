@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.engines.installed import mujoco_version
 from flexspine.engines.space_dataset import space_dataset
 from flexspine.engines.space_run import SpaceRun
@@ -144,7 +144,7 @@ def _impact(time: Array, stands: NDArray[np.bool_], peaks: Array) -> float | Non
 def space_record(run: SpaceRun, summary: SpaceSummary) -> dict[str, Any]:
     """Return outcome, settings, law of contact and measures as JSON holds them, in SI units."""
     return {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "robot": run.robot.name,
         "outcome": run.outcome.name,
         "message": run.outcome.message,

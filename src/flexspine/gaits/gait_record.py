@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.gaits.continuation import Branch
 from flexspine.gaits.family import BranchPoint
 from flexspine.gaits.gait import Gait
@@ -23,7 +23,7 @@ def gait_record(gait: Gait, stability: Stability | None = None) -> dict[str, Any
     stability = stability or floquet_multipliers(gait)
     summary, model = gait.summary, gait.model
     record = {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "preset": model.name,
         "model": model.kind.name,
         "parameters": values(model.parameters),
@@ -79,7 +79,7 @@ def branch_record(branch: Branch) -> dict[str, Any]:
         return {branch.over: point.value, **freed, **gait_record(point.gait, point.stability)}
 
     return {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "over": branch.over,
         "fixed": dict(branch.family.problem.fixed),
         "free": list(branch.free),

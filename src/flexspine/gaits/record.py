@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from flexspine._version import SCHEMA_VERSION
+from flexspine._version import STAMP
 from flexspine.gaits.measures import summarize
 from flexspine.models.legs import SIDES
 from flexspine.models.simulation import Run
@@ -20,7 +20,7 @@ def run_record(run: Run) -> dict[str, Any]:
     summary = summarize(run)
     spine = summary.spine_range
     record = {
-        "schema_version": SCHEMA_VERSION,
+        **STAMP,
         "preset": run.model.name,
         "model": run.model.kind.name,
         "outcome": run.outcome.name,

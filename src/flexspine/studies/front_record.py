@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexspine._version import SCHEMA_VERSION, __version__
+from flexspine._version import STAMP
 from flexspine.gaits.gait_record import gait_record
 from flexspine.gaits.record import finite
 from flexspine.studies.objectives import COST, PEAK_GRF
@@ -41,8 +41,7 @@ def front_record(found: Optimisation) -> dict[str, Any]:
     SI and radians; ``gains`` are by objective the shares by which stiffness by phase lowers it.
     """
     return {
-        "schema_version": SCHEMA_VERSION,
-        "flexspine": __version__,
+        **STAMP,
         "mean_speed": found.reference.mean_speed,
         "minimised": list(found.minimise),
         "seed": found.seed,
