@@ -12,8 +12,8 @@ import xarray as xr
 from tests.cli.conftest import Cli, run_here
 
 FIELDS = {
-    "schema_version", "flexspine", "robot", "outcome", "message", "advice", "duration", "settings", "spine",
-    "measures", "tolerance",
+    "schema_version", "flexspine", "robot", "outcome", "message", "advice", "duration", "settings",
+    "spine", "measures", "tolerance",
 }  # fmt: skip
 
 MEASURES = {

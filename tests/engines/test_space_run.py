@@ -212,3 +212,13 @@ def test_without_opengl_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(MachineError, match="neither EGL nor OSMesa") as raised:
         list(rendered(walked(), np.zeros(1), (16, 9)))
     assert "libosmesa6" in raised.value.remedy
+
+
+def test_an_opengl_that_was_asked_for_and_is_not_there_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(MachineError, match="as MUJOCO_GL=glfw asks") as raised:
+        list(rendered(walked(), np.zeros(1), (16, 9)))
+    assert "unset MUJOCO_GL" in raised.value.remedy

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -201,25 +200,18 @@ def _write(stage: Path, start: Gait, record: dict[str, Any], progress: Steps) ->
     from flexspine.cli.results import write_json
     from flexspine.gaits.files import save_gait
     from flexspine.report.branch_figure import plot_branch
+    from flexspine.studies.tables import write_table
 
     progress.begin("writing data")
     save_gait(start, stage / "start.json")
     write_json(record, stage / "branch.json")
-    _write_csv(record, stage / "branch.csv")
+    # Parameters are left out, as only the one followed changes.
+    write_table([_row(point) for point in record["points"]], stage / "branch.csv")
     progress.begin("drawing")
     plot_branch(record).savefig(stage / "branch.png")
 
 
-def _write_csv(record: dict[str, Any], path: Path) -> None:
-    """One row per gait; parameters are left out, as only the one followed changes."""
-    rows = [_flat(point) for point in record["points"]]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def _flat(point: dict[str, Any]) -> dict[str, Any]:
+def _row(point: dict[str, Any]) -> dict[str, Any]:
     from flexspine.parameters import flattened
 
     row: dict[str, Any] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,6 +28,9 @@ from flexspine.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from flexspine.studies.limits import Cell
+
+# What an earlier run may have left, and this one not.
+FIGURE = re.compile(r"limits\.png")
 
 STIFFNESSES = (200.0, 220.0, 240.0, 260.0)
 SPEEDS = (3.0, 3.5, 4.0, 4.25, 4.5)
@@ -113,7 +117,7 @@ def limits(
         }
         some = any(cell.limits for cell in cells)
         if directory is not None:
-            with directory.stage() as stage:
+            with directory.stage(FIGURE) as stage:
                 write_json(record, stage / "limits.json")
                 _write(stage, cells, some)
     if json:

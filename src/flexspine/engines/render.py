@@ -48,8 +48,13 @@ def opengl() -> str | None:
 
 def _backends() -> tuple[str, ...]:
     """Which OpenGL to try, in turn."""
-    own = os.environ.get("MUJOCO_GL")
+    own = _own()
     return (own,) if own else BACKENDS
+
+
+def _own() -> str | None:
+    """Which OpenGL the user asks for, if any."""
+    return os.environ.get("MUJOCO_GL") or None
 
 
 def rendered(
@@ -95,7 +100,13 @@ def _pictures(arguments: list[str], count: int, size: tuple[int, int]) -> Iterat
             return
         if done:
             raise MachineError(f"MuJoCo's renderer stopped ({told})", "run it again")
+    why = f"({told or 'no reason told'})"
+    if own := _own():
+        raise MachineError(
+            f"there is no OpenGL to draw with as MUJOCO_GL={own} asks {why}",
+            "unset MUJOCO_GL, or leave --render",
+        )
     raise MachineError(
-        f"there is no OpenGL to draw with, neither EGL nor OSMesa ({told or 'no reason told'})",
+        f"there is no OpenGL to draw with, neither EGL nor OSMesa {why}",
         "install one of them, such as Debian's libegl1 or libosmesa6, or leave --render",
     )

@@ -80,9 +80,10 @@ def summarize_space(run: SpaceRun) -> SpaceSummary:
     whole: dict[str, Any] = {
         "strides": strides,
         "distance": float(np.hypot(*(com[-1] - com[0])[:2])),
-        "torque": float(np.abs(samples["torque"]).max()),
-        "deepest": float(samples["depth"].max()),
-        "imbalance": float(np.abs(balance - balance[0]).max()),
+        # What broke down in the end has no numbers there.
+        "torque": float(np.nanmax(np.abs(samples["torque"]))),
+        "deepest": float(np.nanmax(samples["depth"])),
+        "imbalance": float(np.nanmax(np.abs(balance - balance[0]))),
     }
     count = int(run.duration * (1 - SETTLED) * frequency + ROUNDING)
     if count < 1 or not run.outcome.completed:
