@@ -9,9 +9,19 @@ from typing import Any
 
 import pytest
 
-from flexspine import Model, load_model, plot_run, simulate, summarize, to_dataset
+from flexspine import (
+    Model,
+    load_model,
+    plot_run,
+    simulate,
+    summarize,
+    to_dataset,
+    write_report,
+)
+from flexspine.models.files import write_netcdf
 from flexspine.models.legs import Leg
 from flexspine.models.model import Source
+from flexspine.report.branch_axis import axis_of
 
 GUIDE = Path(__file__).parents[2] / "docs" / "own" / "two_joint_bounder.py"
 
@@ -78,3 +88,22 @@ def test_its_data_and_figure_name_the_new_coordinate(animal: Model) -> None:
     assert data["middle_pitch"].attrs == {"units": "rad", "long_name": "middle pitch"}
     assert data["middle_pitch_rate"].attrs["units"] == "rad/s"
     plot_run(data)
+
+
+def test_its_results_become_a_page(animal: Model, tmp_path: Path) -> None:
+    write_netcdf(to_dataset(simulate(animal)), tmp_path / "trajectory.nc")
+    page = write_report(tmp_path).read_text(encoding="utf-8")
+    for told in ("apex.middle_pitch", "middle pitch at the start", "apex.middle_pitch_rate"):
+        assert told in page
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("middle_pitch", "middle pitch at the apex (°)"),
+        ("spine.stiffness", "spine stiffness $k_t$ (N m/rad)"),
+        ("middle.mass", "middle mass"),
+    ],
+)
+def test_its_branches_are_drawn_over_what_it_has(name: str, label: str) -> None:
+    assert axis_of(name, "two-joint-bounder").told == label

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from matplotlib.ticker import FuncFormatter
 
-from flexspine.models.dataset import VARIABLES
-from flexspine.models.registry import find_kind
+from flexspine.models.dataset import unit_and_meaning
+from flexspine.models.registry import KINDS
 from flexspine.parameters import quantities
 from flexspine.report.caption import SIDES
 
@@ -36,6 +36,9 @@ NAMES = {
 
 # What SI values are multiplied by for units that read better.
 FACTORS = {"°": 180 / pi, "mm": 1e3, "%": 1e2}
+
+# The unit of what only a model of its own could tell: none is written.
+UNKNOWN = "1"
 
 # A branch whose middle point is below this share of its largest value reaches over decades.
 DECADES = 0.1
@@ -75,10 +78,12 @@ def _described(name: str, model: str) -> tuple[str, str]:
     """What people call a quantity or parameter, and its unit."""
     if name in NAMES:
         return NAMES[name]
-    if name in VARIABLES:
-        return f"{name.replace('_', ' ')} at the apex", VARIABLES[name][0]
-    units = {item.name: item.unit for item in quantities(find_kind(model).parameters)}
-    return name.replace(".", " ").replace("_", " "), units[name]
+    words = name.replace(".", " ").replace("_", " ")
+    declared = quantities(KINDS[model].parameters) if model in KINDS else ()
+    units = {each.name: each.unit for each in declared}
+    if name in units or "." in name:
+        return words, units.get(name, UNKNOWN)
+    return f"{words} at the apex", unit_and_meaning(name)[0] or UNKNOWN
 
 
 def spread(axes: Axes, along: list[float]) -> None:

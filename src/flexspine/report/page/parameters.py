@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from flexspine.control.gains import Gains, load_walk, walk_names
-from flexspine.models.dataset import VARIABLES
+from flexspine.models.dataset import unit_and_meaning
 from flexspine.models.model import Source
 from flexspine.models.presets import load_model, preset_names
 from flexspine.models.registry import KINDS
@@ -153,7 +153,7 @@ def _rows(
         usual = BY_DEFAULT if about and value == about.default else BY_SOURCE
         yield name, value, unit, meaning, origins.get(name, usual)
     for name, value in given.get("apex", {}).items():
-        unit, meaning = VARIABLES[STARTS.get(name, name)]
+        unit, meaning = unit_and_meaning(STARTS.get(name, name))
         origin = origins.get(APEX, BY_SOURCE)
         yield f"apex.{name}", value, unit, f"{meaning} at the start", origin
     for side, value in given.get("touchdown_angles", {}).items():
