@@ -219,9 +219,3 @@ def test_another_configuration_is_not_mixed_in(
     assert app.run([*SMALL_MAP, "--out", out]) == 2
     assert "another configuration" in capsys.readouterr().err
     assert summary(tmp_path) == before
-
-
-def test_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:
-    for verb in ("basin", "map"):
-        assert app.run([verb, "--help"]) == 0
-        assert f"flexspine {verb} --out results/{verb}" in capsys.readouterr().out

@@ -150,12 +150,6 @@ def test_ranges_without_a_gait_are_exit_code_1(cli: Cli, tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-def test_help_has_examples(cli: Cli) -> None:
-    done = cli("optimise", "--help")
-    assert done.returncode == 0
-    assert "flexspine optimise --speed 4.25 --out results/optimise" in done.stdout
-
-
 def front(first: list[float], second: list[float], stable: bool, **shifts: float) -> Any:
     """A front that was made up."""
     return {

@@ -130,10 +130,3 @@ def test_a_motion_that_differs_is_exit_code_1(
     monkeypatch.setattr(pinned_check, "PinnedMujoco", wrong)
     assert app.run([*QUICK]) == 1
     assert "DOES NOT AGREE" in capsys.readouterr().out
-
-
-def test_help_has_examples(cli: Cli) -> None:
-    done = cli("verify", "pinned", "--help")
-    assert done.returncode == 0
-    assert "flexspine verify pinned --out" in done.stdout
-    assert "pinned" in cli("verify", "--help").stdout

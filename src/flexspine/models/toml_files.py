@@ -59,7 +59,7 @@ def is_path(name: str) -> bool:
     """Whether a name can only be meant as that of a user's file."""
     try:
         return Path(name).suffix == SUFFIX or Path(name).exists()
-    except ValueError:
+    except (OSError, ValueError):
         return True
 
 
