@@ -51,6 +51,18 @@ class ParameterSet(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
+    def __init__(self, **given: Any) -> None:
+        """Take every parameter by name. Raises `ParameterError`."""
+        try:
+            super().__init__(**given)
+        except ValidationError as failure:
+            declared = {item.name: item for item in quantities(type(self))}
+            raise _explained(failure, declared) from None
+
+    # As pydantic marks its own: groups inside are checked as parts of the whole, by their full
+    # names, without this.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
 
 P = TypeVar("P", bound=ParameterSet)
 

@@ -106,6 +106,10 @@ def test_names_are_those_that_there_are(offered: Offered) -> None:
     assert offered("control", "--method", "d") == ["deadbeat"]
     assert "touchdown.fore" in offered("control", "--steer", "touch")
     assert "legs.extension=" in offered("gait", "--free", "legs")
+    assert names(offered("bound", "--touchdown", "")) == {"fore", "hind"}
+    # Two, or the shell would add a space before the value.
+    for words in (("bound", "--touchdown", "f"), ("gait", "--free", "legs.ext")):
+        assert len(offered(*words)) == 2
 
 
 def test_choices_are_those_of_the_code() -> None:

@@ -206,3 +206,10 @@ def test_advice_after_a_fall_is_about_the_feedback() -> None:
     record = steered_record(run, gait(), design(*ANGLES))
     assert record["outcome"] == "fell"
     assert "steer otherwise" in record["advice"]
+
+
+def test_steering_that_gives_too_few_numbers_is_refused() -> None:
+    short = Fixed(("touchdown.fore", "touchdown.hind"), np.array([0.46]))
+    with pytest.raises(ParameterError, match=r"an array of shape \(1,\), not \(2,\)") as raised:
+        steer(load_model("kamimura2015-flexible"), short)
+    assert "touchdown.fore, touchdown.hind" in raised.value.remedy

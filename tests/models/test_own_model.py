@@ -11,6 +11,7 @@ import pytest
 
 from flexspine import (
     Model,
+    ParameterError,
     load_model,
     plot_run,
     simulate,
@@ -21,6 +22,7 @@ from flexspine import (
 from flexspine.models.files import write_netcdf
 from flexspine.models.legs import Leg
 from flexspine.models.model import Source
+from flexspine.parameters import ParameterSet, quantity
 from flexspine.report.branch_axis import axis_of
 
 GUIDE = Path(__file__).parents[2] / "docs" / "own" / "two_joint_bounder.py"
@@ -107,3 +109,27 @@ def test_its_results_become_a_page(animal: Model, tmp_path: Path) -> None:
 )
 def test_its_branches_are_drawn_over_what_it_has(name: str, label: str) -> None:
     assert axis_of(name, "two-joint-bounder").told == label
+
+
+class Springs(ParameterSet):
+    """Joints that may differ."""
+
+    fore_stiffness: float = quantity("N m/rad", "of the joint in front", at_least=0, upper=1e9)
+    hind_stiffness: float = quantity("N m/rad", "of the joint behind", at_least=0, upper=1e9)
+
+
+@pytest.mark.parametrize(("hind", "alike"), [(300.0, True), (400.0, False)])
+def test_ends_that_differ_by_any_name_are_no_mirror_images(
+    animal: Model, hind: float, alike: bool
+) -> None:
+    springs = Springs(fore_stiffness=300.0, hind_stiffness=hind)
+    other = replace(animal, parameters=changed(animal.parameters, spine=springs))
+    assert other.alike is alike
+
+
+def test_a_number_out_of_bounds_is_refused_in_one_line(animal: Model) -> None:
+    with pytest.raises(ParameterError, match=r"'mass' = -1.0 is not usable") as raised:
+        type(animal.parameters.middle)(mass=-1.0, inertia=0.02, spine_offset=0.1)
+    assert "kg" in raised.value.remedy
+    with pytest.raises(ParameterError, match="'stiffness' has no value"):
+        type(animal.parameters.spine)()

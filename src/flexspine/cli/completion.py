@@ -91,6 +91,11 @@ def apex(context: typer.Context, incomplete: str) -> Found:
     return _assigning(incomplete, _of_preset(context, "apex"))
 
 
+def touchdown(context: typer.Context, incomplete: str) -> Found:
+    """Complete the touchdown angles of a preset, as assignments."""
+    return _assigning(incomplete, _of_preset(context, "touchdown"))
+
+
 def settings(context: typer.Context, incomplete: str) -> Found:
     """Complete what can be set, as assignments: of the preset, or of the robot and its walk."""
     return _assigning(incomplete, _parameters(context))
@@ -114,7 +119,10 @@ def joints(context: typer.Context, incomplete: str) -> Found:
 
 def ranges(context: typer.Context, incomplete: str) -> Found:
     """Complete the same, where a range or a value follows."""
-    return [(f"{name}=", about) for name, about in quantities(context, incomplete)]
+    found = [(f"{name}=", about) for name, about in quantities(context, incomplete)]
+    if len(found) == 1:  # a shell would add a space
+        found.append((f"{found[0][0]}0", "a value, or LOW:HIGH"))
+    return found
 
 
 def _beginning(incomplete: str, known: Mapping[str, str]) -> Found:

@@ -131,7 +131,7 @@ Touchdown = Annotated[
         "--touchdown",
         metavar="LEG=ANGLE",
         help="Set a touchdown angle in rad from the vertical, e.g. fore=0.46; repeat it.",
-        autocompletion=completion.among("fore=", "hind="),
+        autocompletion=completion.touchdown,
     ),
 ]
 

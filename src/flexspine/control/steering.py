@@ -183,6 +183,12 @@ class SteeredBounder(OnGround):
             apex = apex + self.noise.sensing * off * self._scales
         before = point.held[self._inputs]
         wanted = self.steering.between(apex, before) if between else self.steering.at_apex(apex)
+        if np.shape(wanted) != np.shape(self._inputs):
+            found, due = np.shape(wanted), np.shape(self._inputs)
+            raise ParameterError(
+                f"steering gives an array of shape {found}, not {due}",
+                f"return an array of one for each of {', '.join(self.steering.inputs)}",
+            )
         held = point.held.copy()
         held[self._inputs] = self._done(wanted, before) if between else self._done(wanted)
         if self.ground is not None:

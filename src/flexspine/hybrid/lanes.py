@@ -21,7 +21,7 @@ from flexspine.hybrid.step_events import StepEvents
 from flexspine.hybrid.system import Mode
 
 # Bytes; the Taylor coefficients of all terms of all lanes of an integrator stay in fast memory.
-COEFFICIENTS = 320_000
+COEFFICIENTS = 130_000
 
 # SIMD registers side by side: so many that a call from Python costs little a lane.
 REGISTERS = (2, 8)

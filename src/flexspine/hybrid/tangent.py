@@ -26,6 +26,9 @@ from flexspine.hybrid.system import Guard, Mode
 
 LANES = hy.recommended_simd_size()
 
+# Nodes; longer equations, of dozens of parameters, would compile for longer than they ever run.
+LARGE = 100_000
+
 
 @dataclass(frozen=True)
 class TangentFlow:
@@ -110,10 +113,12 @@ class TangentCode:
         lower = Lowering(known, system.parameters, chain.definitions, len(numbers))
         rates = [lower(mode.field[s]) for s in system.states]
         changes = [lower(chain(mode.field[s])) for s in system.states]
+        field = list(zip((*states, *deviations), (*rates, *changes), strict=True))
         integrator = hy.taylor_adaptive_batch(
-            list(zip((*states, *deviations), (*rates, *changes), strict=True)),
+            field,
             np.zeros((2 * n, LANES)),
             tol=self.compiled.tolerance,
+            compact_mode=sum(len(rate) for _, rate in field) > LARGE,
         )
         # Code that needs few numbers may not reach as far as all held variables.
         reach = len(integrator.pars)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -25,6 +26,9 @@ from flexspine.parameters import ParameterSet, is_number, quantities, replaced, 
 
 # Below the first, rounding exceeds the truncation; above the second, nothing said here holds.
 TOLERANCES = (1e-17, 1e-3)
+
+# An end as a word of a parameter's name.
+SIDE = re.compile(rf"(?<![a-z])({'|'.join(SIDES)})(?![a-z])")
 
 # SI; beyond this no start or angle means anything, and squares of it still fit a double.
 LARGEST_START = 1e6
@@ -203,13 +207,17 @@ class Model:
 
     @cached_property
     def alike(self) -> bool:
-        """Whether the fore and the hind end have the same parameters."""
-        given = values(self.parameters)
-        return all(
-            value == given[name.replace("fore", "hind")]
-            for name, value in given.items()
-            if "fore" in name.split(".")
-        )
+        """Whether the fore and the hind end have the same parameters.
+
+        Those are told by ``fore`` and ``hind`` as words of their names, wherever they stand.
+        """
+        ends: dict[str, dict[str, float]] = {side: {} for side in SIDES}
+        for name, value in values(self.parameters).items():
+            side = SIDE.search(name)
+            if side:
+                ends[side[0]][SIDE.sub("", name, count=1)] = value
+        fore, hind = ends.values()
+        return fore == hind
 
     @cached_property
     def mass(self) -> float:
@@ -309,7 +317,7 @@ def _check_numbers(kind: str, given: Mapping[str, Any], known: Collection[str]) 
         if not (is_number(value) and -LARGEST_START <= value <= LARGEST_START):
             raise ParameterError(
                 f"{kind} '{name}' = {shortened(value)} is not usable",
-                f"give a number no larger than {LARGEST_START:g}",
+                f"give a number in SI units or radians, no larger than {LARGEST_START:g}",
             )
     for name in known:
         if name not in given:

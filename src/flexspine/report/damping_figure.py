@@ -54,6 +54,9 @@ SHORT, ROOM = 0.1, 1.3
 # What spans more than this is drawn logarithmically.
 WIDE = 5.0
 
+# Of the largest value; less is zero but for rounding.
+ROUNDING = 1e-9
+
 # A spectral radius beyond this is off its panel: a gait on the brink has any.
 HIGHEST = 10.0
 
@@ -234,7 +237,7 @@ def _draw(axes: Axes, column: list[Line], measure: Measure) -> None:
         drawn = [value for value in drawn if value < HIGHEST]
         axes.set_ylim(0.9 * min(drawn, default=1.0), HIGHEST)
     low, high = min(drawn, default=0.0), max(drawn, default=0.0)
-    if low > 0 and high > WIDE * low:
+    if low > ROUNDING * high and high > WIDE * low:
         axes.set_yscale("log")
         _label(axes.yaxis)
     else:
