@@ -216,13 +216,27 @@ def _quantity(name: str, field: FieldInfo) -> Quantity:
     )
 
 
+def _dotted(fault: Mapping[str, Any]) -> str:
+    """The dotted name of what pydantic finds fault with."""
+    return ".".join(str(part) for part in fault["loc"])
+
+
 def _explained(failure: ValidationError, declared: Mapping[str, Quantity]) -> ParameterError:
     """Say in one line what pydantic says in several; the first fault is the one told."""
     fault = failure.errors()[0]
-    name = ".".join(str(part) for part in fault["loc"])
+    name = _dotted(fault)
     if fault["type"] == "missing":
-        absent = name if name in declared else next(n for n in declared if n.startswith(name))
-        return ParameterError(f"parameter '{absent}' has no value", f"give it, e.g. {absent}=...")
+        groups = [_dotted(each) for each in failure.errors() if each["type"] == "missing"]
+        absent = [
+            known
+            for known, about in declared.items()
+            if about.default is None and any(f"{known}.".startswith(f"{g}.") for g in groups)
+        ]
+        if len(absent) > 1:
+            return ParameterError(f"parameters {', '.join(absent)} have no value", "give them")
+        return ParameterError(
+            f"parameter '{absent[0]}' has no value", f"give it, e.g. {absent[0]}=..."
+        )
     about = declared[name]
     return ParameterError(
         f"parameter '{name}' = {shortened(fault['input'])} is not usable",

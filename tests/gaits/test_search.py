@@ -430,3 +430,11 @@ def test_values_of_a_start_that_is_no_gait_are_not_taken() -> None:
     model = load_model("kamimura2015-flexible", apex={"speed": 4.0})
     with pytest.raises(ParameterError, match=r"is no gait .*; say what is fixed"):
         find_gaits(model, starts=1)
+
+
+def test_a_speed_that_energy_forbids_is_told() -> None:
+    wanted = {"energy": 290.0, "height": 0.32, "mean_speed": 9.0}
+    search = find_gaits(load_model("kamimura2015-flexible"), wanted, symmetric=True, starts=2)
+    assert not search.gaits
+    # Half of 20.8 kg times 81 m^2/s^2.
+    assert "there is none: at 9 m/s kinetic energy alone is 842.4 J; give" in search.advice

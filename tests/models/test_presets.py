@@ -66,6 +66,7 @@ def test_a_users_file_works_where_a_preset_does(tmp_path: Path) -> None:
     assert model.touchdown["fore"] == 0.45
     assert model.source.of("spine.stiffness") == "bench, 2 May"
     assert "mine.toml" in model.source.of("touchdown")
+    assert all(note.startswith("kamimura2015-flexible: ") for note in model.source.notes[:-1])
     assert "measured on the bench" in model.source.notes
     assert simulate(model).trajectory.events
 

@@ -161,7 +161,8 @@ def _report(run: SpaceRun, summary: SpaceSummary) -> str:
         assert summary.heading is not None
         assert summary.turning is not None
         lines.append(
-            f"  steady speed     {summary.speed:.3f} m/s, {summary.strides} strides, "
+            f"  steady speed     {summary.speed:.3f} m/s ({run.walk.gains.gait.speed:.3f} wanted "
+            f"of feet that stand), {summary.strides} strides, "
             f"{summary.distance:.2f} m; heading {summary.heading:+.3f} rad, turning "
             f"{summary.turning:+.4f} rad/s"
         )

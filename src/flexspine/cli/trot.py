@@ -286,7 +286,7 @@ def _report(run: RobotRun, summary: WalkSummary) -> str:
         )
     low, high = summary.normal
     lines += [
-        f"  normal forces    {max(low, 0.0):.1f} to {high:.1f} N on feet that are to stand",
+        f"  normal forces    {max(low, 0.0) + 0.0:.1f} to {high:.1f} N on feet that are to stand",
         f"  peak force       {summary.peak_force:.1f} N on any foot",
         f"  friction demand  {summary.friction_demand:.3f}, sliding "
         f"{100 * summary.sliding:.2f} % of the time",

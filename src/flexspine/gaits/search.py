@@ -46,11 +46,13 @@ class Search:
     ``gaits`` are symmetric ones first. ``tally`` counts starts by ``found`` or the reason that
     there is nothing: ``fell``, ``no_apex`` and other outcomes, ``stalled``, ``left_bounds``,
     ``refuted``. ``dropped`` counts drawn points by the outcome that made them no starts at all.
+    ``out_of_reach`` tells why there can be no gait, if that is known.
     """
 
     gaits: tuple[Gait, ...]
     tally: Mapping[str, int]
     dropped: Mapping[str, int]
+    out_of_reach: str = ""
 
     def __repr__(self) -> str:
         return f"<Search: {len(self)} gaits from {self.advice}>"
@@ -72,6 +74,8 @@ class Search:
             told += f"; drawn and dropped before: {_counted(self.dropped)}"
         if self.gaits or not self.tally:
             return told
+        if self.out_of_reach:
+            return f"{told}; {self.out_of_reach}"
         worst = max(self.tally, key=lambda name: self.tally[name])
         return f"{told}; {ADVICE.get(worst, OTHER)}"
 
@@ -126,7 +130,19 @@ def find_gaits(
                 progress((number + (count + 1) / starts) / len(problems))
         dropped.update(sampler.dropped)
     found.sort(key=lambda gait: (not gait.symmetric, gait.family, gait.model.touchdown["fore"]))
-    return Search(tuple(found), dict(tally), dict(dropped))
+    return Search(tuple(found), dict(tally), dict(dropped), _out_of_reach(model, wanted))
+
+
+def _out_of_reach(model: Model, wanted: Mapping[str, float]) -> str:
+    """Why no gait can be as wanted, if energy tells: at that speed motion alone has more."""
+    energy, speed = wanted.get("energy"), wanted.get("mean_speed")
+    if energy is None or speed is None or "energy" not in model.system.section.conserved:
+        return ""
+    least = model.mass * speed**2 / 2
+    if energy >= least:
+        return ""
+    why = f"there is none: at {speed:g} m/s kinetic energy alone is {least:.4g} J"
+    return f"{why}; give more energy or less speed"
 
 
 def pose_problems(

@@ -110,14 +110,19 @@ def _based(title: str, name: str, content: Mapping[str, Any], users: tuple[str, 
     told = dict.fromkeys((*changed, *({"apex", "touchdown"} & content.keys())), f"file {name}")
     provenance = {**model.source.provenance, **told, **flattened(content.get("provenance", {}))}
     source = Source(
-        title=content.get("title", base.source.title),
+        title=content.get("title", f"{base.name}, changed"),
         citation=content.get("citation", base.source.citation),
         source=base.source.source,
-        notes=(*base.source.notes, *content.get("notes", ())),
-        doubts=(*base.source.doubts, *content.get("doubts", ())),
+        notes=(*_of(base, base.source.notes), *content.get("notes", ())),
+        doubts=(*_of(base, base.source.doubts), *content.get("doubts", ())),
         provenance=provenance,
     )
     return model.renamed(title, source)
+
+
+def _of(base: Model, texts: tuple[str, ...]) -> tuple[str, ...]:
+    """What is told of a base, not of what is based on it."""
+    return tuple(f"{base.name}: {text}" for text in texts)
 
 
 def _numbers(content: Mapping[str, Any], table: str) -> dict[str, float]:
