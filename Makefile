@@ -1,14 +1,15 @@
 # make run: the main job.  make test: every check.  make docs: the documentation site.
-# make bench: speed, as ratios.
+# make bench: speed, as ratios.  make coverage: what the tests run.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
 SITE := docs/conf.py docs/_sphinx docs/own
 
-.PHONY: run test docs bench pictures clean
+.PHONY: run test docs coverage bench pictures clean
 
 run: $(VENV)/.installed
+	@echo "The published study, some minutes:"
 	$(BIN)/flexspine study --out $(OUT)
 	@echo "Look at $(OUT)/verdicts.md and $(OUT)/peak_grf_over_speed.png"
 
@@ -25,6 +26,10 @@ docs: $(VENV)/.installed-dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/read docs docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b doctest -d docs/_build/read docs docs/_build/doctest
 	@echo "Open docs/_build/html/index.html"
+
+# How much of the library the tests run, by line and branch; takes half as long again as they do.
+coverage: $(VENV)/.installed-dev
+	$(BIN)/pytest -n auto --dist loadfile --cov --cov-report=term
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks
