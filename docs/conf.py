@@ -28,7 +28,11 @@ extensions = [
     "mathml",
     "generated_pages",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = [
+    "_build",
+    "**sg_execution_times.rst",
+    *(f"gallery/*.{kind}" for kind in ("ipynb", "py", "json", "zip", "md5")),
+]
 default_role = "py:obj"
 nitpicky = False
 

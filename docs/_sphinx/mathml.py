@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from html import unescape
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -16,10 +18,17 @@ MATHML = "http://www.w3.org/1998/Math/MathML"
 DOTS = "\u02d9\u00a8"  # one, two
 ElementTree.register_namespace("", MATHML)
 
+# Characters by names that HTML knows and XML does not.
+NAMED = re.compile(r"&(?!(?:amp|lt|gt|quot|apos);)\w+;")
+
+
+def _character(named: re.Match[str]) -> str:
+    return unescape(named[0])
+
 
 def _mathml(tex: str, **how: bool) -> str:
     """Set a formula; docutils would set indices of letters with dots above and below these."""
-    formula = ElementTree.fromstring(tex2mathml(tex, **how))
+    formula = ElementTree.fromstring(NAMED.sub(_character, tex2mathml(tex, **how)))
     for both in list(formula.iter(f"{{{MATHML}}}munderover")):
         letter, index, dots = both
         if dots.text and dots.text in DOTS:

@@ -204,7 +204,7 @@ def begin_long_run(folder: Path) -> subprocess.Popen[str]:
 
 def test_an_interrupt_is_exit_code_130_and_leaves_nothing(tmp_path: Path) -> None:
     process = begin_long_run(tmp_path)
-    for _ in range(600):
+    for _ in range(6000):
         if list(tmp_path.glob("results/.partial-*/*.png")):
             break
         time.sleep(0.05)

@@ -232,7 +232,7 @@ def interrupt(folder: Path) -> str:
         text=True,
     )
     trace = folder / "results" / "branch.trace.jsonl"
-    for _ in range(600):
+    for _ in range(6000):
         if trace.exists() and trace.stat().st_size > 20_000:
             break
         time.sleep(0.02)

@@ -296,7 +296,7 @@ def test_an_interrupt_leaves_nothing(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     )
-    for _ in range(600):
+    for _ in range(6000):
         if (tmp_path / "results").exists():
             break
         time.sleep(0.05)

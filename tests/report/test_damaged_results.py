@@ -80,7 +80,7 @@ def test_a_table_that_is_none_is_told(results: Path) -> None:
     assert "empty.csv 0 rows." in page.text
 
 
-@pytest.mark.parametrize("change", [{"parameters": "{"}, {"apex": '{"nothing": 1}'}])
+@pytest.mark.parametrize("change", [{"parameters": "{"}, {"apex": "[1]"}])
 def test_a_dataset_of_another_shape_costs_only_its_section(
     results: Path, change: dict[str, str]
 ) -> None:

@@ -224,7 +224,7 @@ def test_no_workers_and_a_piece_that_kills_workers(machines: Machines) -> None:
         list(crew.map(abs, [(0, -1)]))
     machines.worker(address)
     with DaskWorkers(address) as crew, pytest.raises(MachineError, match="killed 1 worker"):
-        list(crew.map(os._exit, [(0, 1)]))
+        list(crew.map(signal.raise_signal, [(0, signal.SIGKILL)]))
 
 
 def test_workers_with_another_flexspine_are_named(machines: Machines, tmp_path: Path) -> None:
