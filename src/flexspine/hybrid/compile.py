@@ -23,6 +23,9 @@ from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode
 
 Array = NDArray[np.float64]
 
+# LLVM's level of optimization, of 3. Higher ones take up to twice as long and gain nothing here.
+EFFORT = 1
+
 
 class Due(NamedTuple):
     """A guard that may fire at the instant at which its mode is entered.
@@ -140,7 +143,12 @@ class CompiledSystem:
         ]
         start = [0.0] * len(system.states)
         integrator = hy.taylor_adaptive(
-            field, start, tol=self.tolerance, t_events=events, compact_mode=system.large
+            field,
+            start,
+            tol=self.tolerance,
+            t_events=events,
+            compact_mode=system.large,
+            opt_level=EFFORT,
         )
         kernel, jumps = self._event_kernel(mode)
         # Folding a large system takes longer than it saves.
@@ -245,6 +253,7 @@ def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool
         outputs or [hy.expression(0.0)],
         vars=variables or [hy.expression("unused")],
         compact_mode=large,
+        opt_level=EFFORT,
     )
 
 

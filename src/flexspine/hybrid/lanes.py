@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import Array, CompiledSystem
+from flexspine.hybrid.compile import EFFORT, Array, CompiledSystem
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.step_events import StepEvents
 from flexspine.hybrid.system import Mode
@@ -55,7 +55,10 @@ class LaneMode:
                 field.append((hy.expression(f"g{i}"), hy.sum(slope)))
         self.width = _width(self.code.integrator)
         self._integrator = hy.taylor_adaptive_batch(
-            field, np.zeros((len(field), self.width)), tol=compiled.tolerance
+            field,
+            np.zeros((len(field), self.width)),
+            tol=compiled.tolerance,
+            opt_level=EFFORT,
         )
         self._coefficients = compiled.coefficients(lower.coefficients)
         # Code that needs few numbers may not reach as far as all held variables.
