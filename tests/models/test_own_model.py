@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import sympy as sp
 
 from flexspine import (
+    InputError,
     Model,
     ParameterError,
+    UnknownNameError,
     load_model,
     plot_run,
     simulate,
@@ -19,6 +22,8 @@ from flexspine import (
     to_dataset,
     write_report,
 )
+from flexspine.models.actuation import Features
+from flexspine.models.bounder import Body
 from flexspine.models.files import write_netcdf
 from flexspine.models.legs import Leg
 from flexspine.models.model import Source
@@ -49,6 +54,25 @@ def animal() -> Model:
         touchdown={"fore": 0.46, "hind": 0.56},
         source=Source(title="three segments, two joints"),
     )
+
+
+def test_a_letter_that_is_not_declared_is_named(animal: Model) -> None:
+    def forgetful(features: Features) -> Body:
+        body = animal.kind.body(features)
+        names = {name: letter for name, letter in body.parameters.items() if name != "middle.mass"}
+        return replace(body, parameters=names)
+
+    with pytest.raises(InputError, match="use 'm_m', which is no state, no parameter"):
+        simulate(replace(animal, kind=replace(animal.kind, name="forgetful", body=forgetful)))
+
+
+def test_a_parameter_that_is_misspelt_is_named(animal: Model) -> None:
+    def misspelt(features: Features) -> Body:
+        body = animal.kind.body(features)
+        return replace(body, parameters={**body.parameters, "midle.mass": sp.Symbol("m_x")})
+
+    with pytest.raises(UnknownNameError, match=r"'midle.mass'; did you mean 'middle.mass'\?"):
+        simulate(replace(animal, kind=replace(animal.kind, name="misspelt", body=misspelt)))
 
 
 def test_its_energy_is_kept(animal: Model) -> None:

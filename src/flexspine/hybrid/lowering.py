@@ -13,9 +13,11 @@ from typing import Any
 import heyoka as hy
 import sympy as sp
 
+from flexspine.errors import InputError
+
 
 class Lowering:
-    """Translate the expressions of one mode.
+    """Translate the expressions of one mode. Letters that it does not know raise `InputError`.
 
     ``variables`` maps the symbols that change in time (states, held variables) to heyoka
     expressions; ``parameters`` are the symbols to fold. Folded values take ``par[first], ...``;
@@ -66,6 +68,11 @@ class Lowering:
         placeholders: dict[sp.Symbol, Any] = {}
         folded = self._fold(expression, placeholders)
         used = {symbol: self._known[symbol] for symbol in _symbols(folded) & self._known.keys()}
+        for symbol in _symbols(folded) - used.keys() - placeholders.keys():
+            raise InputError(
+                f"the equations use '{symbol}', which is no state, no parameter and not defined",
+                "add it to the parameters or to the definitions",
+            )
         return hy.from_sympy(folded, {**used, **placeholders})
 
     def _is_constant(self, expression: sp.Expr) -> bool:

@@ -258,10 +258,10 @@ class Model:
     def parameter_vector(self) -> Array:
         """Parameters and touchdown angles in the order of ``system.parameters``."""
         given = values(self.parameters)
-        body = self.kind.body(BARE)
-        return np.array(
-            [*(given[name] for name in body.parameters), *(self.touchdown[s] for s in SIDES)]
-        )
+        needed = self.kind.body(BARE).parameters
+        for name in needed.keys() - given.keys():
+            raise UnknownNameError(f"parameter of the body of a {self.kind.name}", name, given)
+        return np.array([*(given[name] for name in needed), *(self.touchdown[s] for s in SIDES)])
 
     def bind(self, tolerance: float) -> BoundSystem:
         """Compile the system for a tolerance and give it this model's numbers.
