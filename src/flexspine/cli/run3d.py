@@ -188,8 +188,8 @@ def _report(run: SpaceRun, summary: SpaceSummary) -> str:
     lines += [
         f"  torque           up to {summary.torque:.1f} N m",
         f"  contact          f = {law.stiffness:g} N/m depth + {law.damping:g} N s/m rate, "
-        f"friction {run.robot.friction:g}; {1e3 * law.dragged:.0f} g dragged along, creep "
-        f"{1e6 * law.creep:.1f} um/s a newton",
+        f"friction {run.robot.friction:g}; it adds {1e3 * law.dragged:.0f} g to a foot, which "
+        f"creeps by {1e6 * law.creep:.1f} um/s a newton while it sticks",
         f"  depth            up to {1e3 * summary.deepest:.1f} mm",
         f"  energy           balance closed to {summary.imbalance:.2g} J at steps of "
         f"{1e3 * run.settings['step']:g} ms",

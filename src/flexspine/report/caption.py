@@ -46,7 +46,7 @@ def describe(dataset: xr.Dataset) -> list[str]:
     if is_robot(dataset):
         spine = ", ".join(part.split(maxsplit=2)[2] for part in _of_spine(given))
         parts = [*_of_task(dataset), f"spine {spine}"] if spine else _of_task(dataset)
-        return joined(parts + _mean_speed(dataset), WIDE) + _changed(dataset)
+        return joined(parts + _mean_speed(dataset), WIDE) + _set_by_user(dataset)
     parts = [dataset.attrs["ground"]] if "ground" in dataset.attrs else []
     parts += _of_spine(given)
     parts += of_legs(given, "stiffness $k_l$", "stiffness", "N/m per leg pair")
@@ -62,7 +62,7 @@ def describe(dataset: xr.Dataset) -> list[str]:
         parts.append(f"touchdown angles: {both}")
     began, energy = float(dataset["time"][0]), float(dataset["total_energy"][0])
     parts.append(f"energy {energy:.4g} J at {f'{began:.2f} s' if began else 'the start'}")
-    return joined(parts + _mean_speed(dataset)) + _changed(dataset)
+    return joined(parts + _mean_speed(dataset)) + _set_by_user(dataset)
 
 
 def _of_spine(given: dict[str, Any]) -> list[str]:
@@ -124,10 +124,10 @@ def _mean_speed(dataset: xr.Dataset) -> list[str]:
     return [f"mean speed {float(x[-1] - x[0]) / duration:#.3g} m/s{start}"]
 
 
-def _changed(dataset: xr.Dataset) -> list[str]:
+def _set_by_user(dataset: xr.Dataset) -> list[str]:
     origins = json.loads(dataset.attrs.get("provenance", "{}"))
-    changed = [name for name, origin in origins.items() if origin == "set by user"]
-    return [f"changed from the preset: {_few(changed)}"] if changed else []
+    names = [name for name, origin in origins.items() if origin == "set by user"]
+    return [f"set by user: {_few(names)}"] if names else []
 
 
 def of_legs(given: dict[str, Any], what: str, name: str, unit: str) -> list[str]:
