@@ -23,8 +23,8 @@ test: $(VENV)/.installed-dev
 
 # Runs its examples and pages of code; fails on any warning, such as a broken link.
 docs: $(VENV)/.installed-dev
-	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/read docs docs/_build/html
-	$(BIN)/sphinx-build -W --keep-going -q -b doctest -d docs/_build/read docs docs/_build/doctest
+	$(BIN)/sphinx-build -j auto -W --keep-going -q -b html -d docs/_build/read docs docs/_build/html
+	$(BIN)/sphinx-build -j auto -W --keep-going -q -b doctest -d docs/_build/read docs docs/_build/doctest
 	@echo "Open docs/_build/html/index.html"
 
 # How much of the library the tests run, by line and branch; takes half as long again as they do.
@@ -54,11 +54,11 @@ $(VENV)/bin/python:
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
 $(VENV)/.installed: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --editable '.[engine]'
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[engine]'
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'
 	touch $@ $(VENV)/.installed
 
 clean:

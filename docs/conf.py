@@ -70,6 +70,7 @@ sphinx_gallery_conf = {
     "image_scrapers": (PicturesOnDisk(),),
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
+    "parallel": True,
     "download_all_examples": False,
     "show_memory": False,
     "show_signature": False,
