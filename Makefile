@@ -6,6 +6,9 @@ BIN := $(VENV)/bin
 OUT ?= results
 SITE := docs/conf.py docs/_sphinx docs/own
 
+# Commands that tests start would else compile what they import, each anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run test docs coverage bench pictures clean
 
 run: $(VENV)/.installed
@@ -54,11 +57,11 @@ $(VENV)/bin/python:
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
 $(VENV)/.installed: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --no-compile --editable '.[engine]'
+	$(BIN)/python -m pip install --quiet --editable '.[engine]'
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	touch $@ $(VENV)/.installed
 
 clean:
