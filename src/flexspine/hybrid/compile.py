@@ -23,14 +23,8 @@ from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode
 
 Array = NDArray[np.float64]
 
-
-def effort(large: bool) -> dict[str, Any]:
-    """How hard LLVM works on code, as options of heyoka.
-
-    Of its three levels the higher ones take up to twice as long and gain nothing here. Large code,
-    whose functions call each other, would take ten times as long and gain less than a third.
-    """
-    return {"compact_mode": large, "opt_level": 0 if large else 1}
+# LLVM's level of optimization, of 3. Higher ones take up to twice as long and gain nothing here.
+EFFORT = 1
 
 
 class Due(NamedTuple):
@@ -149,7 +143,12 @@ class CompiledSystem:
         ]
         start = [0.0] * len(system.states)
         integrator = hy.taylor_adaptive(
-            field, start, tol=self.tolerance, t_events=events, **effort(system.large)
+            field,
+            start,
+            tol=self.tolerance,
+            t_events=events,
+            compact_mode=system.large,
+            opt_level=EFFORT,
         )
         kernel, jumps = self._event_kernel(mode)
         # Folding a large system takes longer than it saves.
@@ -253,7 +252,8 @@ def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool
     return hy.cfunc(
         outputs or [hy.expression(0.0)],
         vars=variables or [hy.expression("unused")],
-        **effort(large),
+        compact_mode=large,
+        opt_level=EFFORT,
     )
 
 

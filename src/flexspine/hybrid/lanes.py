@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import Array, CompiledSystem, effort
+from flexspine.hybrid.compile import EFFORT, Array, CompiledSystem
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.step_events import StepEvents
 from flexspine.hybrid.system import Mode
@@ -58,7 +58,7 @@ class LaneMode:
             field,
             np.zeros((len(field), self.width)),
             tol=compiled.tolerance,
-            **effort(large=False),
+            opt_level=EFFORT,
         )
         self._coefficients = compiled.coefficients(lower.coefficients)
         # Code that needs few numbers may not reach as far as all held variables.

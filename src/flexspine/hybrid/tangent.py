@@ -20,7 +20,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import CompiledSystem, compile_expressions, effort
+from flexspine.hybrid.compile import EFFORT, CompiledSystem, compile_expressions
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.system import Guard, Mode
 
@@ -118,7 +118,8 @@ class TangentCode:
             field,
             np.zeros((2 * n, LANES)),
             tol=self.compiled.tolerance,
-            **effort(sum(len(rate) for _, rate in field) > LARGE),
+            compact_mode=sum(len(rate) for _, rate in field) > LARGE,
+            opt_level=EFFORT,
         )
         # Code that needs few numbers may not reach as far as all held variables.
         reach = len(integrator.pars)
