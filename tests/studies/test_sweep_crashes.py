@@ -10,7 +10,6 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,10 +21,10 @@ import pytest
 from flexspine import Sweep, read_plan, sweep
 from flexspine.cli import app
 from flexspine.errors import InputError, OutputError
+from flexspine.studies import sweep as sweeps
 from flexspine.studies.store import Store
+from tests.studies.commands import Command, dying, noted, noting
 from tests.studies.test_sweep import files_of, processes_of, rows_of
-
-ROOT = Path(__file__).parents[2]
 
 PLAN = """
 model = "scout2"
@@ -37,9 +36,6 @@ speed = { around = 0.02 }
 height = { around = 0.02 }
 """
 CHUNKS = 12
-
-# s; what a chunk takes at least, so that there is time to kill who does it.
-SLOW = 0.15
 
 # s; what a process that has lost its parent may take to leave.
 LEAVING = 10.0
@@ -64,82 +60,14 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     return Whole(folder / "plan.toml", sweep(folder / "plan.toml", folder / "out"))
 
 
-# What runs in other processes: the command, which notes the chunks it begins, or dies at a write.
-
-
-def noted(work: tuple[Any, int]) -> Any:
-    """Do a chunk, not too fast, and note its number before."""
-    from flexspine.studies.tasks import do_chunk
-
-    with Path(os.environ["NOTES"]).open("a") as notes:
-        notes.write(f"{work[1]}\n")
-    time.sleep(SLOW)
-    return do_chunk(work)
-
-
-def noting() -> None:
-    """The command line, noting every chunk."""
-    from flexspine.__main__ import main
-    from flexspine.studies import sweep as sweeps
-
-    sweeps.do_chunk = noted
-    main()
-
-
-def dying() -> None:
-    """The command line, killed at a certain write: ``HOW`` at the ``NUMBER``-th."""
-    from flexspine.__main__ import main
-
-    how, left = os.environ["HOW"], int(os.environ["NUMBER"])
-    sync, replace = os.fsync, Path.replace
-
-    def at_last() -> bool:
-        nonlocal left
-        left -= 1
-        return left == 0
-
-    def half_written(file: int) -> None:
-        if at_last():
-            os.ftruncate(file, os.fstat(file).st_size // 2)
-            os.kill(os.getpid(), signal.SIGKILL)
-        sync(file)
-
-    def renaming(path: Path, target: Path) -> Path:
-        if at_last():
-            if how == "renamed":
-                replace(path, target)
-            os.kill(os.getpid(), signal.SIGKILL)
-        return replace(path, target)
-
-    if how == "half written":
-        os.fsync = half_written
-    else:
-        Path.replace = renaming  # type: ignore[method-assign]
-    main()
-
-
-def begin(what: Any, out: Path, plan: Path, processes: int = 1, **more: str) -> Any:
-    """Start the command in a process of its own."""
-    code = f"from {__name__} import {what.__name__}; {what.__name__}()"
-    return subprocess.Popen(
-        [sys.executable, "-c", code, "sweep", plan, "--out", out, "--json",
-         "--processes", str(processes)],
-        cwd=ROOT,
-        env={**os.environ, "NOTES": str(out.with_suffix(".notes")), **more},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )  # fmt: skip
-
-
 def parts_in(out: Path) -> list[int]:
     """Numbers of the chunks that are finished."""
     return sorted(int(path.stem.removeprefix("part-")) for path in out.glob("rows/*/part-*"))
 
 
-def wait_for_parts(process: Any, out: Path, count: int) -> None:
+def wait_for_parts(process: Command, out: Path, count: int) -> None:
     while len(parts_in(out)) < count:
-        assert process.poll() is None, process.communicate()
+        assert process.returncode is None, process.communicate()
         time.sleep(0.01)
 
 
@@ -187,20 +115,24 @@ def assert_is_whole(out: Path, whole: Whole) -> None:
     assert {path.name for path in out.iterdir()} == {"manifest.json", "rows"}
 
 
-@pytest.mark.parametrize(("processes", "moments"), [(1, (1, 4, 9)), (2, (3,))])
+@pytest.mark.parametrize(("processes", "moments"), [(1, (1, 5)), (2, (3,))])
 def test_killed_at_any_moment_it_goes_on_and_loses_only_what_was_being_done(
-    whole: Whole, tmp_path: Path, processes: int, moments: tuple[int, ...]
+    whole: Whole,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    processes: int,
+    moments: tuple[int, ...],
 ) -> None:
     out, chance = tmp_path / "out", random.Random(processes)
     finished: list[int] = []
     begun: list[int] = []
     for moment in moments:
-        process = begin(noting, out, whole.plan, processes)
+        process = Command(noting, out, whole.plan, processes)
         wait_for_parts(process, out, moment)
         time.sleep(chance.uniform(0, 0.2))
         family = processes_of(process.pid)
         assert len(family) == 1 if processes == 1 else len(family) >= 1 + processes
-        process.kill()
+        process.send_signal(signal.SIGKILL)
         output, _ = process.communicate()
         assert output == ""
         assert_all_leave(family)
@@ -211,11 +143,11 @@ def test_killed_at_any_moment_it_goes_on_and_loses_only_what_was_being_done(
         assert 0 <= lost <= (1 if processes == 1 else 2 * processes)
         assert_finished_chunks_are_whole(out, whole)
         finished, begun = now, notes
-    last = begin(noting, out, whole.plan)  # as many processes as one likes
-    output, errors = last.communicate(timeout=120)
-    assert last.returncode == 0, errors
-    assert json.loads(output)["made"] == CHUNKS - len(finished)
-    assert json.loads(output)["digest"] == whole.done.digest
+    monkeypatch.setattr(sweeps, "do_chunk", noted)
+    monkeypatch.setenv("NOTES", str(out.with_suffix(".notes")))
+    last = sweep(whole.plan, out)  # as many processes as one likes
+    assert last.made == CHUNKS - len(finished)
+    assert last.digest == whole.done.digest
     assert sorted(notes_of(out)[len(begun) :]) == sorted(set(range(CHUNKS)) - set(finished))
     assert_is_whole(out, whole)
 
@@ -233,8 +165,8 @@ def test_killed_while_a_file_is_written_it_leaves_no_half_of_it(
     whole: Whole, tmp_path: Path, how: str, number: int, kept: int
 ) -> None:
     out = tmp_path / "out"
-    process = begin(dying, out, whole.plan, HOW=how, NUMBER=str(number))
-    _, errors = process.communicate(timeout=120)
+    process = Command(dying, out, whole.plan, HOW=how, NUMBER=str(number))
+    _, errors = process.communicate()
     assert process.returncode == -signal.SIGKILL, errors
     assert parts_in(out) == list(range(kept))
     assert_finished_chunks_are_whole(out, whole)
@@ -251,13 +183,13 @@ def test_interrupted_it_says_that_the_same_command_goes_on(
 ) -> None:
     """Also to who presses the keys again and again."""
     out = tmp_path / "out"
-    process = begin(noting, out, whole.plan, processes)
+    process = Command(noting, out, whole.plan, processes)
     wait_for_parts(process, out, 1)
     family = processes_of(process.pid)
     for _ in range(times):
         process.send_signal(number)
         time.sleep(0.03)
-    output, errors = process.communicate(timeout=60)
+    output, errors = process.communicate()
     assert process.returncode == 130
     assert json.loads(output)["error"] == "interrupted"
     assert errors.splitlines() == [
@@ -275,7 +207,7 @@ def test_interrupted_it_says_that_the_same_command_goes_on(
 
 def test_a_worker_that_is_killed_is_replaced(whole: Whole, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    process = begin(noting, out, whole.plan, 2)
+    process = Command(noting, out, whole.plan, 2)
     wait_for_parts(process, out, 1)
     workers = [
         number
@@ -284,7 +216,7 @@ def test_a_worker_that_is_killed_is_replaced(whole: Whole, tmp_path: Path) -> No
     ]
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
-    output, errors = process.communicate(timeout=120)
+    output, errors = process.communicate()
     assert (process.returncode, errors) == (0, "")
     record = json.loads(output)
     assert (record["made"], record["digest"]) == (CHUNKS, whole.done.digest)
@@ -378,13 +310,13 @@ def test_another_process_at_work_is_not_disturbed(
     whole: Whole, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    first = begin(noting, out, whole.plan)
+    first = Command(noting, out, whole.plan)
     wait_for_parts(first, out, 1)
     assert app.run(["sweep", str(whole.plan), "--out", str(out)]) == 2
     output, errors = capsys.readouterr()
     assert output == ""
     assert errors.startswith(f"flexspine: another process is at work in '{out}'; wait for it")
-    output, errors = first.communicate(timeout=120)
+    output, errors = first.communicate()
     assert (first.returncode, errors) == (0, "")
     assert json.loads(output)["made"] == CHUNKS
     assert_is_whole(out, whole)
