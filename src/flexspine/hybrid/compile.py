@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 # LLVM's level of optimization, of 3. Higher ones take up to twice as long and gain nothing here.
 EFFORT = 1
 
+# What large systems evaluate now and then only takes longer to optimize than it ever runs.
+NONE = 0
+
 
 class Due(NamedTuple):
     """A guard that may fire at the instant at which its mode is entered.
@@ -102,6 +105,7 @@ class CompiledSystem:
     def __init__(self, system: HybridSystem, tolerance: float) -> None:
         self.system = system
         self.tolerance = tolerance
+        self._effort = NONE if system.large else EFFORT
         self._modes: dict[str, CompiledMode] = {}
         self._observables: dict[str, Any] = {}
         self._lowerings: dict[str, Lowering] = {}
@@ -127,7 +131,8 @@ class CompiledSystem:
             function = compile_expressions(
                 [lower(expr) for expr in mode.observables.values()],
                 self._variables,
-                large=self.system.large,
+                compact=self.system.large,
+                effort=self._effort,
             )
             self._observables[name] = (tuple(mode.observables), function)
         names, function = self._observables[name]
@@ -187,7 +192,8 @@ class CompiledSystem:
                     due=_due(target, mode),
                 )
             )
-        return compile_expressions(outputs, self._variables), tuple(jumps)
+        kernel = compile_expressions(outputs, self._variables, effort=self._effort)
+        return kernel, tuple(jumps)
 
     def after(self, mode: Mode, guard: Guard) -> tuple[list[Any], list[Any]]:
         """States and held variables after a jump, and the guards of its target there with rates.
@@ -247,13 +253,15 @@ class CompiledSystem:
         return self._lowerings[mode.name]
 
 
-def compile_expressions(outputs: list[Any], variables: list[Any], *, large: bool = False) -> Any:
+def compile_expressions(
+    outputs: list[Any], variables: list[Any], *, compact: bool = False, effort: int = EFFORT
+) -> Any:
     """Compile expressions; a function of nothing or to nothing gets one zero to work on."""
     return hy.cfunc(
         outputs or [hy.expression(0.0)],
         vars=variables or [hy.expression("unused")],
-        compact_mode=large,
-        opt_level=EFFORT,
+        compact_mode=compact,
+        opt_level=effort,
     )
 
 

@@ -26,8 +26,9 @@ from flexspine.hybrid.system import Guard, Mode
 
 LANES = hy.recommended_simd_size()
 
-# Nodes; longer equations, of dozens of parameters, would compile for longer than they ever run.
-LARGE = 100_000
+# Nodes; longer equations, of dampers and actuators, take seconds longer to compile into the fastest
+# code than into compact one, which thousands of strides would have to make good.
+LARGE = 6_000
 
 
 @dataclass(frozen=True)
