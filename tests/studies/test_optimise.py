@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from flexspine import (
     Model,
     Optimisation,
     examine,
+    find_gaits,
     floquet_multipliers,
     load_gait,
     load_model,
@@ -214,8 +216,8 @@ def test_the_same_seed_finds_the_same_and_so_does_an_interrupted_search(
                 raise StoppedError
 
         done = optimise(
-            published, SPEED, ranges=RANGES, spines=(CONSTANT,), points=2, draws=1, seed=seed,
-            store=store, progress=stop,
+            published, SPEED, minimise=(PEAK_GRF, RADIUS), ranges={"spine.stiffness": (250, 280)},
+            spines=(CONSTANT,), points=2, draws=1, seed=seed, store=store, progress=stop,
         )  # fmt: skip
         return [tuple(point.gait.model.numbers.values()) for point in done.fronts[CONSTANT].points]
 
@@ -271,7 +273,8 @@ def test_margins_vanish_where_gaits_end(published: Gait) -> None:
     assert clear[1] > CLEARANCE
 
 
-def test_a_speed_without_gaits_is_told(published: Gait) -> None:
+def test_a_speed_without_gaits_is_told(published: Gait, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("flexspine.studies.optimise.find_gaits", partial(find_gaits, starts=10))
     with pytest.raises(NoGaitError, match="no gait at 9 m/s") as failure:
         optimise(published, 9.0, ranges=RANGES, draws=0)
     assert failure.value.exit_code == 1

@@ -69,6 +69,14 @@ def do(tmp_path: Path) -> Doing:
     return carry_out
 
 
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+    """Those of both models, to be read only."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "plan.toml").write_text(RUNS)
+    return sweep(folder / "plan.toml", folder / "out")
+
+
 def rows_of(done: Sweep, model: str | None = None) -> list[Row]:
     """All rows, or those of one model, in the order of the points."""
     found: list[Row] = pq.read_table(done.path / "rows").to_pylist()
@@ -95,11 +103,10 @@ def started(row: Row, base: Model) -> Model:
     )
 
 
-def test_rows_of_runs_are_those_of_runs_one_by_one(do: Doing) -> None:
-    done = do(RUNS)
-    assert done.rows == 20
+def test_rows_of_runs_are_those_of_runs_one_by_one(runs: Sweep) -> None:
+    assert runs.rows == 20
     strides = 0
-    for row in rows_of(done):
+    for row in rows_of(runs):
         run = simulate(started(row, load_model(row["model"])), strides=3)
         assert row["outcome"] == run.outcome.name
         assert row["strides"] == len(run.apexes) - 1
@@ -110,40 +117,38 @@ def test_rows_of_runs_are_those_of_runs_one_by_one(do: Doing) -> None:
             assert row[f"peak_grf_{side}"] == pytest.approx(peak, rel=1e-9)
         assert row["duration"] == pytest.approx(run.trajectory.duration, abs=1e-10)
         assert row["apex_time"] == pytest.approx(run.section_points[-1].time, abs=1e-10)
-    assert done.strides == strides
-    assert done.outcomes.keys() == {"completed", "fell"}
-    assert sum(done.outcomes.values()) == 20
+    assert runs.strides == strides
+    assert runs.outcomes.keys() == {"completed", "fell"}
+    assert sum(runs.outcomes.values()) == 20
 
 
-def test_what_a_model_lacks_is_null_in_its_rows(do: Doing) -> None:
-    done = do(RUNS)
+def test_what_a_model_lacks_is_null_in_its_rows(runs: Sweep) -> None:
     lacking = {
         SCOUT: {"fore_pitch", "hind_pitch", "fore_pitch_rate", "hind_pitch_rate"},
         FLEXIBLE: {"pitch", "pitch_rate"},
     }
     for model, names in lacking.items():
-        for row in rows_of(done, model):
+        for row in rows_of(runs, model):
             empty = {name for name, value in row.items() if value is None}
             also = {"at_fore_pitch_rate"} if model == SCOUT else set()
             assert empty == {f"apex_{name}" for name in names} | also
 
 
-def test_every_point_has_its_row_in_the_file_of_its_chunk(do: Doing) -> None:
-    done = do(RUNS)
-    assert [len(pq.ParquetFile(file).read()) for file in done.files] == [4, 4, 2, 4, 4, 2]
+def test_every_point_has_its_row_in_the_file_of_its_chunk(runs: Sweep) -> None:
+    assert [len(pq.ParquetFile(file).read()) for file in runs.files] == [4, 4, 2, 4, 4, 2]
     for model in (SCOUT, FLEXIBLE):
-        assert [row["point"] for row in rows_of(done, model)] == list(range(10))
-        folder = done.path / "rows" / f"model={model}"
+        assert [row["point"] for row in rows_of(runs, model)] == list(range(10))
+        folder = runs.path / "rows" / f"model={model}"
         assert sorted(path.name for path in folder.iterdir()) == [
             f"part-00000{number}.parquet" for number in range(3)
         ]
-    assert {path.name for path in done.path.iterdir()} == {"manifest.json", "rows"}
+    assert {path.name for path in runs.path.iterdir()} == {"manifest.json", "rows"}
 
 
-def test_the_energy_at_the_start_is_that_of_the_apex(do: Doing) -> None:
+def test_the_energy_at_the_start_is_that_of_the_apex(runs: Sweep) -> None:
     """m g h + m v^2 / 2 + I w^2 / 2 of a rigid body."""
     body = load_model(SCOUT).numbers
-    for row in rows_of(do(RUNS), SCOUT):
+    for row in rows_of(runs, SCOUT):
         energy = (
             body["body.mass"] * (9.81 * body["height"] + row["at_speed"] ** 2 / 2)
             + body["body.inertia"] * body["pitch_rate"] ** 2 / 2
@@ -296,7 +301,7 @@ def test_a_search_that_finds_nothing_says_why_in_its_row(do: Doing) -> None:
 
 
 # The bodies of Fig. 4 of Kamimura et al. 2015, and speeds within the error of a reading.
-NEARBY = (-0.019, -0.01, 0.0, 0.01, 0.019)
+NEARBY = (-0.019, 0.0, 0.019)
 
 
 @pytest.fixture(scope="module")
@@ -335,8 +340,8 @@ def test_gaits_bear_the_published_peak_forces(published: Sweep) -> None:
 
 def test_rows_of_gaits_are_true_of_their_orbits(published: Sweep) -> None:
     rows = [row for row in rows_of(published) if row["outcome"] == "found"]
-    assert len(rows) > 40
-    for row in rows[::4]:
+    assert len(rows) > 24
+    for row in rows[::3]:
         base = load_model(row["model"])
         if row["at_spine_stiffness"] is not None:
             base = base.with_values({"spine.stiffness": row["at_spine_stiffness"]})
@@ -414,15 +419,15 @@ GAITS = f"""
 model = ["{LOCKED}", "{FLEXIBLE}"]
 task = "gaits"
 [axes]
-spine.stiffness = [240, 260]
-mean_speed = [4.45, 4.5, 5.5]
+spine.stiffness = [260]
+mean_speed = [4.5, 5.5]
 """
 
 
-@pytest.mark.parametrize("text", [RUNS, GAITS], ids=["runs", "gaits"])
-def test_pandas_polars_and_duckdb_read_the_same_rows(do: Doing, text: str) -> None:
+@pytest.mark.parametrize("task", ["runs", "gaits"])
+def test_pandas_polars_and_duckdb_read_the_same_rows(do: Doing, runs: Sweep, task: str) -> None:
     """Each against the file itself, as pyarrow reads it alone."""
-    done = do(text)
+    done = runs if task == "runs" else do(GAITS)
     expected = [
         {**row, "model": file.parent.name.removeprefix("model=")}
         for file in done.files
@@ -437,15 +442,14 @@ def test_pandas_polars_and_duckdb_read_the_same_rows(do: Doing, text: str) -> No
         assert order == sorted(expected, key=lambda row: (row["model"] == FLEXIBLE, row["point"]))
 
 
-def test_sql_counts_outcomes_as_the_sweep_does(do: Doing) -> None:
+def test_sql_counts_outcomes_as_the_sweep_does(runs: Sweep) -> None:
     import duckdb
 
-    done = do(RUNS)
     counts = duckdb.sql(
-        f"select outcome, count(*) from read_parquet('{done.path}/rows/**/*.parquet', "
+        f"select outcome, count(*) from read_parquet('{runs.path}/rows/**/*.parquet', "
         "hive_partitioning = true) group by all"
     ).fetchall()
-    assert dict(counts) == done.outcomes
+    assert dict(counts) == runs.outcomes
 
 
 @pytest.mark.parametrize("name", ["a soft spine", "größer", "50%", "a=b"])
@@ -480,39 +484,26 @@ class Shuffled:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_order_of_chunks_changes_nothing(
-    do: Doing, monkeypatch: pytest.MonkeyPatch, seed: int
+    do: Doing, runs: Sweep, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    usual = do(RUNS)
     monkeypatch.setattr(sweeps, "crew_of", lambda *_: Shuffled(seed))
     other = do(RUNS)
-    assert other.digest == usual.digest
-    assert files_of(other) == files_of(usual)
+    assert other.digest == runs.digest
+    assert files_of(other) == files_of(runs)
 
 
-def test_the_number_of_processes_changes_nothing(do: Doing) -> None:
-    alone, together = do(RUNS), do(RUNS, processes=2)
-    assert together.digest == alone.digest
-    assert (together.rows, together.outcomes) == (alone.rows, alone.outcomes)
-    assert files_of(together) == files_of(alone)
+def test_the_digest_is_of_the_rows(do: Doing, runs: Sweep) -> None:
+    others = [RUNS.replace("seed = 4", "seed = 5"), RUNS.replace("strides = 3", "strides = 2")]
+    assert len({runs.digest, *(do(text).digest for text in others)}) == 3
+    assert do(RUNS).digest == runs.digest
 
 
-def test_the_digest_is_of_the_rows(do: Doing) -> None:
-    def digest(text: str) -> str:
-        return do(text).digest
-
-    found = [digest(RUNS), digest(RUNS.replace("seed = 4", "seed = 5"))]
-    found.append(digest(RUNS.replace("strides = 3", "strides = 2")))
-    assert len(set(found)) == 3
-    assert digest(RUNS) == found[0]
-
-
-def test_the_manifest_tells_all_that_is_needed_to_repeat_it(do: Doing) -> None:
-    done = do(RUNS)
-    manifest = json.loads((done.path / "manifest.json").read_text())
+def test_the_manifest_tells_all_that_is_needed_to_repeat_it(runs: Sweep) -> None:
+    manifest = json.loads((runs.path / "manifest.json").read_text())
     assert manifest["finished"] is True
-    assert manifest["digest"] == done.digest
+    assert manifest["digest"] == runs.digest
     assert (manifest["rows"], manifest["chunks"]) == (20, 6)
-    assert manifest["outcomes"] == done.outcomes
+    assert manifest["outcomes"] == runs.outcomes
     assert (manifest["plan"]["seed"], manifest["plan"]["options"]["strides"]) == (4, 3)
     bodies = {model["name"]: model for model in manifest["plan"]["models"]}
     assert bodies[FLEXIBLE]["parameters"]["spine.stiffness"] == 260
@@ -562,9 +553,9 @@ def memory_of(parent: int) -> int:
 
 
 def test_memory_does_not_grow_with_the_number_of_runs(tmp_path: Path) -> None:
-    """A file is some 1.3 MB, its rows are more; those of 42 files would show."""
+    """A file is some 1.3 MB, its rows are more; those of 32 files would show."""
     (tmp_path / "plan.toml").write_text(
-        f'model = "{SCOUT}"\nmethod = "random"\nsamples = {48 * 16384}\nchunk = 16384\n'
+        f'model = "{SCOUT}"\nmethod = "random"\nsamples = {36 * 16384}\nchunk = 16384\n'
         # In the ground, where there is nothing to do.
         "[axes]\nheight = {low = 0.05, high = 0.1}\nspeed = {around = 0.5}\n"
         "pitch_rate = {around = 0.5}\npitch = {within = 0.1}"
@@ -579,12 +570,12 @@ def test_memory_does_not_grow_with_the_number_of_runs(tmp_path: Path) -> None:
     while process.poll() is None:
         used = memory_of(process.pid)
         finished = len(list(tmp_path.glob("out/rows/*/part-*")))
-        if finished <= 6:
+        if finished <= 4:
             early = max(early, used)
         else:
             late = max(late, used)
-        time.sleep(0.03)
+        time.sleep(0.1)
     assert process.returncode == 0
-    assert len(list(tmp_path.glob("out/rows/*/part-*"))) == 48
+    assert len(list(tmp_path.glob("out/rows/*/part-*"))) == 36
     assert early > 50_000_000
     assert late < early + 30_000_000

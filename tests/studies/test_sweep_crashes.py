@@ -205,7 +205,9 @@ def test_interrupted_it_says_that_the_same_command_goes_on(
     assert_is_whole(out, whole)
 
 
-def test_a_worker_that_is_killed_is_replaced(whole: Whole, tmp_path: Path) -> None:
+def test_two_processes_change_nothing_and_one_that_is_killed_is_replaced(
+    whole: Whole, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     process = Command(noting, out, whole.plan, 2)
     wait_for_parts(process, out, 1)
@@ -220,6 +222,7 @@ def test_a_worker_that_is_killed_is_replaced(whole: Whole, tmp_path: Path) -> No
     assert (process.returncode, errors) == (0, "")
     record = json.loads(output)
     assert (record["made"], record["digest"]) == (CHUNKS, whole.done.digest)
+    assert (record["rows"], record["outcomes"]) == (whole.done.rows, whole.done.outcomes)
     assert_is_whole(out, whole)
 
 
