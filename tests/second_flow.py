@@ -56,6 +56,13 @@ class Flow:
         self.times: list[float] = run.t.tolist()
         self.states: list[State] = list(run.y.T)
         self.dense: Callable[[float], State] = run.sol
+        self._rates: dict[int, State] = {}
+
+    def rates(self, k: int) -> State:
+        """The field at node k."""
+        if k not in self._rates:
+            self._rates[k] = self.field(self.states[k])
+        return self._rates[k]
 
     def turning_point(self, gauge: Gauge, left: float, right: float) -> tuple[float, float]:
         """Time and value of a gauge's extremum between two times with slopes of unlike sign."""
@@ -147,8 +154,8 @@ def brackets(flow: Flow, guard: Guard, k: int, above: bool) -> Iterator[tuple[fl
     if above == below:  # it rises through zero: no event
         return
     # Same side at both nodes: look at an extremum on the way, lest two crossings be missed.
-    rate0 = slope(guard.value, s0, flow.field(s0))
-    rate1 = slope(guard.value, s1, flow.field(s1))
+    rate0 = slope(guard.value, s0, flow.rates(k))
+    rate1 = slope(guard.value, s1, flow.rates(k + 1))
     if above and rate0 < 0.0 < rate1:
         turn, value = flow.turning_point(guard.value, left, right)
         if value <= 0.0:
@@ -193,7 +200,8 @@ def highest(flow: Flow, gauge: Gauge, k: int, t: float, s: State) -> float:
     """Largest value of a gauge along a flow, over its nodes up to k and on to state s at time t."""
     times = [*flow.times[: k + 1], t]
     states = [*flow.states[: k + 1], s]
-    rates = [slope(gauge, state, flow.field(state)) for state in states]
+    fields = [*(flow.rates(node) for node in range(k + 1)), flow.field(s)]
+    rates = [slope(gauge, *at) for at in zip(states, fields, strict=True)]
     best = max(gauge(state) for state in states)
     for i in range(len(times) - 1):
         if rates[i] > 0.0 > rates[i + 1]:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from tests.second_flow import (
     SAME_TIME,
@@ -211,6 +212,16 @@ class Stance(NamedTuple):
         """The unit vector along which its hip moves as it turns counter-clockwise."""
         return -self.along[1], self.along[0]
 
+    @property
+    def from_ground(self) -> tuple[float, float]:
+        """What the ground does to the toe: along the leg its force, across it what torque needs.
+
+        The leg has no mass: about its hip, the ground's moment balances the torque.
+        """
+        push = -self.torque / self.length
+        (ux, uy), (px, py) = self.along, self.across
+        return float(self.force * ux + push * px), float(self.force * uy + push * py)
+
 
 class Linkage:
     """Equations of motion in (base x, base y, link angles) and their rates."""
@@ -263,13 +274,10 @@ class Linkage:
         angle, turn = s[2 + link], arm * s[self.n + 2 + link]
         return s[self.n] - turn * math.sin(angle), s[self.n + 1] + turn * math.cos(angle)
 
-    def jacobian(self, s: State, arm: float, link: int) -> NDArray[np.float64]:
-        """Derivative of `place` with respect to the coordinates."""
-        jac = np.zeros((2, self.n))
-        jac[0, 0] = jac[1, 1] = 1.0
-        jac[0, 2 + link] = -arm * math.sin(s[2 + link])
-        jac[1, 2 + link] = arm * math.cos(s[2 + link])
-        return jac
+    def lever(self, s: State, arm: float, link: int) -> tuple[float, float]:
+        """Derivative of `place` by the link's angle; that by the base point is the identity."""
+        angle = s[2 + link]
+        return -arm * math.sin(angle), arm * math.cos(angle)
 
     def com(self, s: State) -> tuple[float, float, float, float]:
         """Position and velocity of the whole body's centre of mass."""
@@ -299,16 +307,6 @@ class Linkage:
         stance = self.leg(s, name, contact)
         link_turn = s[self.n + 2 + self.legs[name].link]
         return float(stance.torque * (link_turn - stance.turn))
-
-    def ground_force(self, s: State, name: str, contact: Contact) -> tuple[float, float]:
-        """Of the ground on a toe: along the leg its force, across it what the hip's torque needs.
-
-        The leg has no mass: about its hip, the ground's moment balances the torque.
-        """
-        stance = self.leg(s, name, contact)
-        push = -stance.torque / stance.length
-        (ux, uy), (px, py) = stance.along, stance.across
-        return float(stance.force * ux + push * px), float(stance.force * uy + push * py)
 
     def spine_spring(self, contact: Contact) -> tuple[float, float]:
         """Stiffness and rest angle of the spine, zero without one."""
@@ -348,17 +346,27 @@ class Linkage:
         n = self.n
         stiffness, rest = self.spine_spring(contact)
 
-        def rates(s: State) -> State:
-            inertia = np.zeros((n, n))
-            load = np.zeros(n)
+        def rates(state: State) -> State:
+            s = state.tolist()
+            inertia = [[0.0] * n for _ in range(n)]
+            load = [0.0] * n
+
+            def act(force: tuple[float, float], point: tuple[float, float], link: int) -> None:
+                load[0] += force[0]
+                load[1] += force[1]
+                load[2 + link] += point[0] * force[0] + point[1] * force[1]
+
             for p in self.parts:
-                jac = self.jacobian(s, p.arm, p.link)
-                angle, turn = s[2 + p.link], s[n + 2 + p.link]
-                # Jdot qdot: the centripetal acceleration of the part about the base point.
-                drift = -p.arm * turn**2 * np.array([math.cos(angle), math.sin(angle)])
-                inertia += p.mass * (jac.T @ jac)
-                inertia[2 + p.link, 2 + p.link] += p.inertia
-                load -= p.mass * (jac.T @ (drift + np.array([0.0, self.gravity])))
+                x, y = point = self.lever(s, p.arm, p.link)
+                inertia[0][0] += p.mass
+                inertia[1][1] += p.mass
+                inertia[0][2 + p.link] = inertia[2 + p.link][0] = p.mass * x
+                inertia[1][2 + p.link] = inertia[2 + p.link][1] = p.mass * y
+                inertia[2 + p.link][2 + p.link] = p.mass * (x**2 + y**2) + p.inertia
+                # The centripetal acceleration of the part about the base point.
+                turn = s[n + 2 + p.link] ** 2
+                ax, ay = -y * turn, x * turn
+                act((-p.mass * ax, -p.mass * (ay + self.gravity)), point, p.link)
             if self.spine is not None:
                 moment = -stiffness * (s[2] - s[3] - rest)
                 moment -= self.spine[1] * (s[n + 2] - s[n + 3])
@@ -366,13 +374,12 @@ class Linkage:
                 load[3] -= moment
             for name in contact.toes:
                 leg, stance = self.legs[name], self.leg(s, name, contact)
-                jac = self.jacobian(s, leg.arm, leg.link)
-                load += stance.force * (jac.T @ np.array(stance.along))
-                if leg.lever:
-                    # Virtual power: torque by the link's turn, less torque by the leg's.
-                    load[2 + leg.link] += stance.torque
-                    load -= stance.torque / stance.length * (jac.T @ np.array(stance.across))
-            return np.concatenate([s[n:], np.linalg.solve(inertia, load)])
+                act(stance.from_ground, self.lever(s, leg.arm, leg.link), leg.link)
+                # Virtual power: torque by the link's turn, less torque by the leg's.
+                load[2 + leg.link] += stance.torque
+            _, accelerations, failed = dposv(inertia, load)
+            assert not failed
+            return np.array([*s[n:], *accelerations])
 
         return rates
 
@@ -520,10 +527,10 @@ class Run:
         for name in contact.toes:
 
             def size(s: State, name: str = name) -> float:
-                return math.hypot(*link.ground_force(s, name, contact))
+                return math.hypot(*link.leg(s, name, contact).from_ground)
 
             def vertical(s: State, name: str = name) -> float:
-                return link.ground_force(s, name, contact)[1]
+                return link.leg(s, name, contact).from_ground[1]
 
             def power(s: State, name: str = name) -> float:
                 return link.hip_power(s, name, contact)
