@@ -55,6 +55,8 @@ class Engine:
             for foot in linkage.feet
         }
         self.data = self.model.createData()
+        order = self.ours(np.arange(self.model.nv))
+        self.upper = np.minimum.outer(order, order), np.maximum.outer(order, order)
 
     def _add(self, joint: int, mass: float, distance: float, inertia: float) -> None:
         tensor = np.diag([0.0, inertia, inertia]) if inertia else np.zeros((3, 3))
@@ -71,10 +73,9 @@ class Engine:
         return np.concatenate([vector[2:], vector[:2]])
 
     def mass_matrix(self, q: Array) -> Array:
-        matrix = pinocchio.crba(self.model, self.data, self.theirs(q)).copy()
-        matrix = np.triu(matrix) + np.triu(matrix, 1).T
-        order = np.r_[2 : len(q), 0, 1]
-        return matrix[np.ix_(order, order)]
+        """Of which Pinocchio makes the upper half."""
+        found: Array = pinocchio.crba(self.model, self.data, self.theirs(q))[self.upper]
+        return found
 
     def forces(self, q: Array, rates: Array) -> Array:
         """Velocity and weight forces together."""
