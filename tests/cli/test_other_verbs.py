@@ -112,7 +112,7 @@ def in_small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spines, "STIFF_POINTS", 4)
     short = partial(damping.DampedSetting, most=1.0, stiffest=270.0)
     monkeypatch.setattr(damping, "DampedSetting", short)
-    monkeypatch.setattr(pinned_check, "HALVINGS", 2)
+    monkeypatch.setattr(pinned_check, "HALVINGS", 3)
     monkeypatch.setattr(robot_claims, "SECONDS", 1.0)
     monkeypatch.setattr(robot_claims, "PUSH_TIME", 0.5)
 

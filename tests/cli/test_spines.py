@@ -11,14 +11,14 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from flexspine.studies import replay_check
+from flexspine.studies import pinned_check, replay_check, template_check
 from flexspine.studies.replay_check import SoftGround
 from tests.cli.conftest import Cli
 from tests.cli.test_gait import assert_one_clear_line
 
 FEW = (
-    "--stiffness", "480", "--stiffness", "60", "--speed", "0.4", "--speed", "0.3", "--seconds", "1",
-    "--processes", "1",
+    "--stiffness", "480", "--stiffness", "60", "--speed", "0.4", "--speed", "0.3",
+    "--seconds", "0.9", "--processes", "1",
 )  # fmt: skip
 
 
@@ -47,7 +47,7 @@ def test_spines_are_compared_kept_and_repeated(cli: Cli, tmp_path: Path) -> None
     assert {row["spine_stiffness"] for row in rows[4:]} == {""}
     with Image.open(tmp_path / "here" / "spines.png") as picture:
         assert picture.width > 900
-    assert cli("rerun", "here").returncode == 0
+    assert cli("rerun", "here", "--processes", "1").returncode == 0
     assert json.loads(cli("spines", *FEW, "--out", "here", "--json").stdout)["made"] == 0
 
 
@@ -74,6 +74,8 @@ def test_engines_agree_and_say_where_not(
     few = (SoftGround(0.035, 5e4, 1e3, 2.5e-4), SoftGround(0.001, 5e5, 3e3, 1e-4))
     monkeypatch.setattr(replay_check.check_replay, "__kwdefaults__",
                         {**replay_check.check_replay.__kwdefaults__, "grounds": few})  # fmt: skip
+    monkeypatch.setattr(template_check.check_template, "__defaults__", (template_check.LEVELS[:3],))
+    monkeypatch.setattr(pinned_check, "HALVINGS", 3)
     done = cli("verify", "engines", "--seconds", "1", "--out", "here", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     record = json.loads(done.stdout)
