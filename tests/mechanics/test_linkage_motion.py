@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import heyoka as hy
 import numpy as np
 import pytest
@@ -60,8 +62,15 @@ class Compiled:
         return found[: self.size], found[self.size :].reshape(-1, 2)
 
 
-def assert_same_motion(linkage: Linkage, feet: list[str], torque: float) -> None:
-    compiled = Compiled(linkage, feet)
+@cache
+def robot_on(feet: tuple[str, ...], flagged: bool = False) -> Compiled:
+    """The ten-link robot on these feet."""
+    return Compiled(load_robot("sc618").linkage, list(feet), flagged)
+
+
+def assert_same_motion(
+    compiled: Compiled, linkage: Linkage, feet: list[str], torque: float
+) -> None:
     rng = np.random.default_rng(11)
     for _ in range(100):
         q, rates = rng.uniform(-1.5, 1.5, linkage.size), rng.normal(0, 2, linkage.size)
@@ -84,21 +93,21 @@ def assert_same_motion(linkage: Linkage, feet: list[str], torque: float) -> None
 
 @pytest.mark.parametrize("feet", STANCES, ids=lambda feet: "+".join(feet) or "none")
 def test_the_robot_moves_as_in_numbers(feet: list[str]) -> None:
-    assert_same_motion(load_robot("sc618").linkage, feet, 5.0)
+    assert_same_motion(robot_on(tuple(feet)), load_robot("sc618").linkage, feet, 5.0)
 
 
 @pytest.mark.parametrize("feet", [[], ["f"], ["f", "h"]], ids=lambda feet: "+".join(feet) or "none")
 def test_an_uneven_tree_moves_as_in_numbers(feet: list[str]) -> None:
-    assert_same_motion(uneven(), feet, 1.0)
+    assert_same_motion(Compiled(uneven(), feet), uneven(), feet, 1.0)
 
 
-TOES = ["toe_1", "toe_2", "toe_3", "toe_4"]
+TOES = ("toe_1", "toe_2", "toe_3", "toe_4")
 
 
 @pytest.mark.parametrize("standing", STANCES, ids=lambda feet: "+".join(feet) or "none")
 def test_flags_tell_feet_that_stand_from_those_in_the_air(standing: list[str]) -> None:
     linkage = load_robot("sc618").linkage
-    plain, flagged = Compiled(linkage, standing), Compiled(linkage, TOES, flagged=True)
+    plain, flagged = robot_on(tuple(standing)), robot_on(TOES, flagged=True)
     flags = np.array([[float(toe in standing), 0.0] for toe in TOES]).ravel()
     rng = np.random.default_rng(4)
     for _ in range(20):
@@ -120,7 +129,7 @@ def test_feet_that_slide_obey_friction_and_momentum(slides: dict[str, int]) -> N
     """And do not rise; those that stick do not move."""
     linkage = load_robot("sc618").linkage
     feet = ["toe_1", "toe_4"]
-    compiled = Compiled(linkage, TOES, flagged=True)
+    compiled = robot_on(TOES, flagged=True)
     flags = np.array([[float(toe in feet), slides.get(toe, 0)] for toe in TOES]).ravel()
     rng = np.random.default_rng(7)
     for _ in range(50):
@@ -148,7 +157,7 @@ def test_feet_that_slide_obey_friction_and_momentum(slides: dict[str, int]) -> N
 def test_drift_of_a_foot_dies_away() -> None:
     """Off its anchor by e and moving by v, it accelerates by -2 w v - w^2 e."""
     linkage = load_robot("sc618").linkage
-    compiled = Compiled(linkage, ["toe_2"])
+    compiled = robot_on(("toe_2",))
     rng = np.random.default_rng(5)
     q, rates = rng.uniform(-1.5, 1.5, 12), rng.normal(0, 2, 12)
     off = np.array([1e-3, -2e-3])
