@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import signal
 import subprocess
 import time
@@ -18,9 +19,6 @@ from tests.cli.test_gait import FIELDS, Found, assert_one_clear_line
 from tests.report.layout import assert_no_text_overlaps
 
 RANGE = ("--from", "3.7", "--to", "4.6")
-
-# Short steps, so that it takes a few seconds.
-LONG = (*RANGE, "--longest-step", "0.008")
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +211,7 @@ def test_a_changed_animal_starts_from_its_own_gait(cli: Cli) -> None:
 @pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
 def test_an_animal_without_a_gait_is_exit_code_1(cli: Cli, tmp_path: Path, as_json: bool) -> None:
     done = cli(
-        "branch", "--set", "spine.stiffness=1", *RANGE, "--out", "results",
+        "branch", "--preset", "slip", "--set", "body.mass=1", *RANGE, "--out", "results",
         *(["--json"] if as_json else []),
     )  # fmt: skip
     assert done.returncode == 1
@@ -222,10 +220,12 @@ def test_an_animal_without_a_gait_is_exit_code_1(cli: Cli, tmp_path: Path, as_js
     assert list(tmp_path.iterdir()) == []
 
 
-def interrupt(folder: Path) -> str:
-    """Start a branch, interrupt it on the way, and return what it said."""
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """What the branch said when it was interrupted on the way, and what it left; tests copy it."""
+    folder = tmp_path_factory.mktemp("interrupted")
     process = subprocess.Popen(
-        [COMMAND, "branch", *LONG, "--out", "results"],
+        [COMMAND, "branch", *RANGE, "--out", "results"],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -233,32 +233,36 @@ def interrupt(folder: Path) -> str:
     )
     trace = folder / "results" / "branch.trace.jsonl"
     for _ in range(6000):
-        if trace.exists() and trace.stat().st_size > 20_000:
+        if trace.exists() and trace.stat().st_size > 8_000:
             break
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert [path.name for path in (folder / "results").iterdir()] == [trace.name]
-    return errors
+    return errors, folder / "results"
 
 
-def test_an_interrupted_branch_goes_on_where_it_was(cli: Cli, tmp_path: Path) -> None:
-    assert cli("branch", *LONG, "--out", "whole").returncode == 0
-    errors = interrupt(tmp_path)
+def test_an_interrupted_branch_goes_on_where_it_was(
+    cli: Cli, tmp_path: Path, traced: Found, interrupted: tuple[str, Path]
+) -> None:
+    errors, left = interrupted
     assert "branch.trace.jsonl" in errors
     assert errors.endswith("flexspine: interrupted\n")
-    done = cli("branch", *LONG, "--out", "results")
+    results = shutil.copytree(left, tmp_path / "results")
+    done = cli("branch", *RANGE, "--out", "results")
     assert done.returncode == 0
     assert "going on from 'results/branch.trace.jsonl'" in done.stderr
-    whole, results = tmp_path / "whole", tmp_path / "results"
+    whole = traced.folder
     assert {path.name for path in results.iterdir()} == {path.name for path in whole.iterdir()}
     assert (results / "branch.json").read_bytes() == (whole / "branch.json").read_bytes()
 
 
-def test_an_interrupted_branch_is_not_mixed_with_another(cli: Cli, tmp_path: Path) -> None:
-    interrupt(tmp_path)
-    trace = tmp_path / "results" / "branch.trace.jsonl"
+def test_an_interrupted_branch_is_not_mixed_with_another(
+    cli: Cli, tmp_path: Path, interrupted: tuple[str, Path]
+) -> None:
+    _, left = interrupted
+    trace = shutil.copytree(left, tmp_path / "results") / "branch.trace.jsonl"
     before = trace.read_bytes()
     done = cli("branch", "--from", "3.7", "--to", "4.61", "--out", "results")
     assert_one_clear_line(done, "other settings")
