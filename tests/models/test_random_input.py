@@ -81,7 +81,7 @@ def check(preset: str, changes: dict[str, Any], apex: dict[str, float], angles: 
         assert np.all(np.isfinite(run.trajectory.end.states))
 
 
-@settings(max_examples=1200)
+@settings(max_examples=600)
 @given(sane())
 def test_sane_bounders_always_end_in_an_outcome(
     case: tuple[str, dict[str, Any], dict[str, float], dict[str, float]],
@@ -89,7 +89,7 @@ def test_sane_bounders_always_end_in_an_outcome(
     check(*case)
 
 
-@settings(max_examples=500)
+@settings(max_examples=300)
 @given(st.data())
 def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) -> None:
     """Within the bounds that the parameters declare, and beyond them."""
@@ -107,7 +107,7 @@ def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) 
     check(model.name, changes, apex, angles)
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(sane(), st.data())
 def test_actuated_bounders_end_in_an_outcome_or_one_error(
     case: tuple[str, dict[str, Any], dict[str, float], dict[str, float]], data: st.DataObject

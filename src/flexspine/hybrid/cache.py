@@ -40,15 +40,18 @@ def open_cache() -> None:
     hy.llvm_state.set_diskcache_path(directory)
     hy.llvm_state.set_diskcache_enabled(True)
     mend_cache()
-    if _fault():
-        hy.llvm_state.set_diskcache_enabled(False)
 
 
 def mend_cache() -> None:
-    """Delete a corrupt store, so that the next compilation rebuilds it."""
+    """Delete a corrupt store, so that the next compilation rebuilds it; give up an unusable one."""
+    if not hy.llvm_state.get_diskcache_enabled():
+        return
     fault = _fault()
     if any(sign in fault for sign in _SIGNS_OF_CORRUPTION):
         _delete_store()
+        fault = _fault()
+    if fault:
+        hy.llvm_state.set_diskcache_enabled(False)
 
 
 def clear_cache() -> tuple[Path, int]:
@@ -59,7 +62,7 @@ def clear_cache() -> tuple[Path, int]:
 
 
 def _fault() -> str:
-    """What heyoka says about the store; nothing if it can be used."""
+    """What heyoka says about the store; nothing if it can be used. It waits 5 s for a lock."""
     try:
         hy.llvm_state.get_diskcache_size()
     except RuntimeError as fault:
