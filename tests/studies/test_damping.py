@@ -14,6 +14,7 @@ import pytest
 from flexspine import examine, load_model, trace_branch
 from flexspine.errors import ParameterError
 from flexspine.gaits.continuation import Branch
+from flexspine.studies import damping as damping_module
 from flexspine.studies import tables
 from flexspine.studies.damping import (
     ACTUATORS,
@@ -117,9 +118,12 @@ def test_the_verdict_of_the_small_study_rests_on_its_gaits(study: DampingStudy) 
 
 
 def test_an_interrupted_study_goes_on_to_the_same_end(
-    spines: SpineStudy, study: DampingStudy, tmp_path: Path
+    spines: SpineStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shorter = replace(SMALL, most=2.0)
+    monkeypatch.setattr(damping_module, "MEASURED", 6)
+    spines = replace(spines, setting=replace(spines.setting, softest=250.0))
+    shorter = replace(SMALL, most=1.0)
+    whole = study_damping(spines, shorter)
 
     def stop(what: str, _share: float) -> None:
         if ACTUATORS[1] in what:
@@ -131,13 +135,7 @@ def test_an_interrupted_study_goes_on_to_the_same_end(
     told: list[tuple[str, float]] = []
     resumed = study_damping(spines, shorter, tmp_path, lambda *step: told.append(step))
     assert [share for _, share in told] == pytest.approx(np.arange(4) / 4)
-    again = study_damping(spines, shorter, tmp_path)
-    assert tables.damping_table(resumed) == tables.damping_table(again)
-    (kept,) = (found for found in resumed.over_stiffness)
-    expected = study.over_stiffness[0]
-    assert [p.value for p in kept.branch.points] == pytest.approx(
-        [p.value for p in expected.branch.points], rel=1e-6
-    )
+    assert tables.damping_table(resumed) == tables.damping_table(whole)
 
 
 @pytest.mark.parametrize("damping", [0.0, -1.0, float("nan"), 1e4])

@@ -11,7 +11,7 @@ import pytest
 
 from flexspine.errors import OutputError, ParameterError
 from flexspine.parameters import values
-from flexspine.studies import tables
+from flexspine.studies import spines, tables
 from flexspine.studies.claims import verdicts
 from flexspine.studies.spines import (
     FLEXIBLE,
@@ -24,12 +24,19 @@ from flexspine.studies.spines import (
 from flexspine.studies.verdict import Verdict
 from tests import second_implementation as reference
 
-SMALL = Setting(speeds=(4.1, 4.7), stiffnesses=(200.0, 260.0), compared=(4.5,))
+SMALL = Setting(speeds=(4.2, 4.7), stiffnesses=(200.0, 260.0), compared=(4.5,))
+
+# Every branch of a study, all of them short.
+TINY = Setting(
+    speeds=(4.48, 4.52), stiffnesses=(250.0, 260.0), compared=(4.5,), softest=250.0, stiffest=300.0
+)
 
 
 @pytest.fixture(scope="module")
 def study() -> SpineStudy:
-    return study_spines(SMALL)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(spines, "STIFF_POINTS", 12)
+        return study_spines(SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -153,17 +160,23 @@ def test_tables_are_the_same_in_parquet_and_csv(study: SpineStudy, tmp_path: Pat
     assert lines[0]["spine_stiffness"] == ""
 
 
-def test_an_interrupted_study_goes_on_to_the_same_end(study: SpineStudy, tmp_path: Path) -> None:
+def test_an_interrupted_study_goes_on_to_the_same_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(spines, "STIFF_POINTS", 2)
+    study = study_spines(TINY)
+
     def stop(what: str, _share: float) -> None:
         if what == "flexible 260":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        study_spines(SMALL, tmp_path, stop)
+        study_spines(TINY, tmp_path, stop)
     kept = sorted(path.name for path in tmp_path.iterdir())
     assert len(kept) == 4
-    resumed = study_spines(SMALL, tmp_path)
+    resumed = study_spines(TINY, tmp_path)
     assert tables.gaits_table(resumed) == tables.gaits_table(study)
+    assert tables.stiffness_table(resumed) == tables.stiffness_table(study)
     assert tables.landmarks_table(resumed) == tables.landmarks_table(study)
 
 
@@ -180,7 +193,7 @@ def test_branches_of_another_setting_are_not_taken_over(tmp_path: Path) -> None:
         (replace(SMALL, speeds=(4.7, 4.1)), "4.7"),
         (replace(SMALL, stiffnesses=()), "stiffness"),
         (replace(SMALL, softest=1e7), "1e"),
-        (replace(SMALL, energy=400.0), "energy"),
+        (replace(SMALL, energy=240.0), "energy"),
         (replace(SMALL, compared=(99.0,)), "99"),
         (replace(SMALL, stiffnesses=(float("nan"),)), "nan"),
     ],
