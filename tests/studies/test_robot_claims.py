@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
+from flexspine.studies import robot_claims
+from flexspine.studies.pinned_check import COMPARED, check_pinned
 from flexspine.studies.robot_claims import robot_verdicts
 from flexspine.studies.verdict import Verdict
 
 
 @pytest.fixture(scope="module")
 def judged() -> dict[int, Verdict]:
-    return {verdict.number: verdict for verdict in robot_verdicts()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(robot_claims, "SECONDS", 2.8)
+        patch.setattr(robot_claims, "check_pinned", partial(check_pinned, seconds=COMPARED))
+        return {verdict.number: verdict for verdict in robot_verdicts()}
 
 
 def test_the_equations_are_those_of_an_independent_engine(judged: dict[int, Verdict]) -> None:
@@ -44,6 +51,8 @@ def test_every_verdict_tells_what_repeats_it(judged: dict[int, Verdict]) -> None
 
 def test_without_mujoco_the_first_stays_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
+    monkeypatch.setattr(robot_claims, "SECONDS", 0.5)
+    monkeypatch.setattr(robot_claims, "PUSH_TIME", 0.2)
     first = robot_verdicts()[0]
     assert first.verdict == "undecided"
     assert "engine" in first.finding
