@@ -11,6 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from flexspine.report import robot_figure
+from flexspine.report.robot_figure import plot_robot
 from tests.cli.conftest import Cli, run_here
 
 FIELDS = {
@@ -192,12 +193,19 @@ def test_a_directory_that_cannot_be_written_to_is_refused_first(cli: Cli, tmp_pa
     assert (tmp_path / "file").read_text() == "kept"
 
 
+def draw_locked(dataset: xr.Dataset) -> Figure:
+    """Draw a robot whose spine is locked, under com; others are drawn in tests of figures."""
+    controller = json.loads(dataset.attrs["settings"])["controller"]
+    locked = "spine" not in dataset["joint"].values
+    return plot_robot(dataset) if locked and controller == "com" else Figure()
+
+
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
-    """What is printed and written by a comparison, made once for all tests, its figures blank."""
+    """What is printed and written by a comparison, made once for all tests."""
     folder = tmp_path_factory.mktemp("compared")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(robot_figure, "plot_robot", lambda _dataset: Figure())
+        patched.setattr(robot_figure, "plot_robot", draw_locked)
         done = run_here("trot", "--compare", "--seconds", "0.5", "--out", folder / "spines")
     assert done.returncode == 0, done.stderr
     return done.stdout, folder / "spines"
