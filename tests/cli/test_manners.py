@@ -313,7 +313,7 @@ def test_ends_of_terrain_come_with_progress(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     out, err = StringIO(), Terminal()
-    few = ["terrain", "step", "--strides", "2", "--runs", "2", "--processes", "1", "--json"]
+    few = ["terrain", "rough", "--strides", "2", "--runs", "2", "--processes", "1", "--json"]
     with redirect_stdout(out), redirect_stderr(err):
         assert run(few) == 0
     assert json.loads(out.getvalue())["ensemble"]["runs"] == 2
