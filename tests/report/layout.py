@@ -31,7 +31,11 @@ def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
 
 
 def assert_no_text_overlaps(figure: Figure) -> None:
-    for (one, a), (two, b) in itertools.combinations(text_boxes(figure), 2):
+    assert_apart(text_boxes(figure))
+
+
+def assert_apart(boxes: list[tuple[str, Bbox]]) -> None:
+    for (one, a), (two, b) in itertools.combinations(boxes, 2):
         width = min(a.x1, b.x1) - max(a.x0, b.x0)
         height = min(a.y1, b.y1) - max(a.y0, b.y0)
         assert not (width > 2 and height > 2), f"{one!r} runs over {two!r}"

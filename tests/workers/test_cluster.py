@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from flexspine.errors import InputError, MachineError
 from flexspine.workers import cluster
 from flexspine.workers.cluster import AHEAD, DaskWorkers
 from tests.workers.crews import assert_every_piece_is_done_once
+from tests.workers.pieces import process_id, threads_inside
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,24 +48,6 @@ try:
 except BaseException as raised:
     print(type(raised).__name__, raised)
 """
-
-
-def process_id(seconds: float) -> int:
-    """Take a while, and tell who did it."""
-    time.sleep(seconds)
-    return os.getpid()
-
-
-_inside: list[int] = []
-
-
-def threads_inside(piece: int) -> int:
-    """Tell how many threads of this process are here."""
-    _inside.append(piece)
-    time.sleep(0.02)
-    count = len(_inside)
-    _inside.remove(piece)
-    return count
 
 
 def task_count(dask_scheduler: Any) -> int:
@@ -102,6 +86,21 @@ class Machines:
         for process in self.started:
             process.kill()
             process.wait()
+
+
+@contextmanager
+def cluster_inside(port: int = 0) -> Iterator[str]:
+    """The address of a scheduler with one worker, both in threads of this process."""
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        host="127.0.0.1",
+        protocol="tcp://",
+        scheduler_port=port,
+        dashboard_address=":0",
+    ) as made:
+        yield made.scheduler_address
 
 
 def until(happened: Callable[[], Any]) -> None:
@@ -191,31 +190,42 @@ def test_workers_may_join_and_may_be_killed(shared: Machines, address: str) -> N
     assert sorted(done) == list(range(next(taken)))
 
 
-@pytest.mark.parametrize("lost", [signal.SIGKILL, signal.SIGTERM, None])
-def test_a_lost_scheduler_and_an_interruption_end_quietly(
-    machines: Machines, lost: signal.Signals | None
+@contextmanager
+def at_work(address: str) -> Iterator[subprocess.Popen[str]]:
+    """A command that has pieces done by a cluster, the first of which is."""
+    words, pipe = [sys.executable, "-c", COMMAND, address], subprocess.PIPE
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as command:
+        assert command.stdout
+        assert command.stdout.readline() == "0\n"
+        yield command
+
+
+def test_an_interruption_ends_quietly(address: str) -> None:
+    with at_work(address) as command:
+        command.send_signal(signal.SIGINT)
+        out, err = command.communicate(timeout=SOON)
+    assert err == ""
+    assert out.splitlines()[-1].startswith("KeyboardInterrupt")
+
+
+@pytest.mark.parametrize("lost", [signal.SIGKILL, signal.SIGTERM])
+def test_a_lost_scheduler_ends_quietly_and_its_place_can_be_taken(
+    machines: Machines, lost: signal.Signals
 ) -> None:
     address = machines.scheduler()
     machines.worker(address)
-    words, pipe = [sys.executable, "-c", COMMAND, address], subprocess.PIPE
-    command = subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True)
-    assert command.stdout
-    assert command.stdout.readline() == "0\n"
-    target = machines.started[0] if lost else command
-    target.send_signal(lost or signal.SIGINT)
-    out, err = command.communicate(timeout=SOON)
-    last = out.splitlines()[-1]
+    with at_work(address) as command:
+        machines.started[0].send_signal(lost)
+        out, err = command.communicate(timeout=SOON)
     assert err == ""
-    if lost is None:
-        assert last.startswith("KeyboardInterrupt")
-        return
+    last = out.splitlines()[-1]
     assert last.startswith(f"MachineError the Dask scheduler at {address} was lost")
     assert "finished is kept" in last
     machines.started[0].wait()
-    assert machines.scheduler(address.rpartition(":")[2]) == address
-    machines.worker(address)
-    with DaskWorkers(address) as crew:
-        assert list(crew.map(abs, [(0, -1)])) == [(0, 1)]
+    with cluster_inside(int(address.rpartition(":")[2])) as another:
+        assert another == address
+        with DaskWorkers(address) as crew:
+            assert list(crew.map(abs, [(0, -1)])) == [(0, 1)]
 
 
 def test_no_workers_and_a_piece_that_kills_workers(machines: Machines) -> None:

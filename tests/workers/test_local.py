@@ -12,7 +12,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ import pytest
 from flexspine.errors import MachineError
 from flexspine.workers.local import MOST_DEATHS, LocalWorkers
 from tests.workers.crews import assert_every_piece_is_done_once
+from tests.workers.pieces import LARGE, killed_always, killed_once, process_id
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,9 +35,6 @@ WHILE = 2.0
 
 # s; far longer than it takes to start a few processes, one after the other.
 SOON = 6.0
-
-# Bytes; more than a pipe takes at once.
-LARGE = 1_000_000
 
 # What users would see on stderr has to be empty.
 WAITING = f"""
@@ -62,51 +59,11 @@ CUT_SHORT = """
 import sys
 from pathlib import Path
 from flexspine.workers.local import LocalWorkers
-from tests.workers.test_local import cut_short_once
+from tests.workers.pieces import cut_short_once
 with LocalWorkers(2) as crew:
     for number, result in crew.map(cut_short_once, enumerate([Path(sys.argv[1]), None])):
         print(number, len(result))
 """
-
-
-def process_id(seconds: float) -> int:
-    """Take a while, and tell who did it."""
-    time.sleep(seconds)
-    return os.getpid()
-
-
-def killed_once(file: Path | None) -> tuple[int, int]:
-    """Be killed the first time; then tell who was, and who did it after that."""
-    if file is None:
-        time.sleep(0.01)
-        return 0, 0
-    if not file.exists():
-        file.write_text(str(os.getpid()))
-        os.kill(os.getpid(), signal.SIGKILL)
-    return int(file.read_text()), os.getpid()
-
-
-def killed_always(directory: Path | None) -> None:
-    """Leave a file, and be killed."""
-    if directory is not None:
-        (directory / str(os.getpid())).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-def cut_short_once(file: Path | None) -> bytes:
-    """Be killed the first time, with the result half sent."""
-    if file is not None and not file.exists():
-        file.touch()
-        # In this worker alone, which has not long to live.
-        setattr(Connection, "_send", _send_half)  # noqa: B010
-    return bytes(LARGE)
-
-
-def _send_half(connection: Connection, data: bytes, *_: Any) -> None:
-    whole = len(data) < LARGE
-    os.write(connection.fileno(), data if whole else data[: LARGE // 2])
-    if not whole:
-        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def until(happened: Callable[[], Any]) -> None:
