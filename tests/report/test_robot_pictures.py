@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from flexspine import animate, load_robot, plot_run, strip
@@ -203,7 +204,7 @@ def test_of_a_long_run_the_last_four_cycles_are_shown(runs: dict[str, xr.Dataset
 
 
 def test_a_fall_is_told(runs: dict[str, xr.Dataset], figures: dict[str, Figure]) -> None:
-    words = " ".join(text for text, _ in text_boxes(figures["fallen"]))
+    words = " ".join(text.get_text() for text in figures["fallen"].findobj(Text))
     assert runs["fallen"].outcome.replace("_", " ") in words
 
 

@@ -25,7 +25,7 @@ from flexspine.report.study_figures import (
     plot_stability_speed,
     plot_stability_stiffness,
 )
-from tests.report.layout import assert_no_text_overlaps, text_boxes
+from tests.report.layout import assert_apart, text_boxes
 
 Row = dict[str, Any]
 Profiles = dict[tuple[str, float], xr.Dataset]
@@ -286,8 +286,9 @@ def test_every_title_says_what_the_numbers_are_of(drawn: dict[str, Figure]) -> N
 
 def test_no_text_runs_over_another(drawn: dict[str, Figure]) -> None:
     for name, figure in drawn.items():
-        assert_no_text_overlaps(figure)
-        for text, box in text_boxes(figure):
+        boxes = text_boxes(figure)
+        assert_apart(boxes)
+        for text, box in boxes:
             assert box.x0 >= 0, f"{name}: {text!r} leaves the figure"
             assert box.x1 <= figure.bbox.width + 1, f"{name}: {text!r} leaves the figure"
 

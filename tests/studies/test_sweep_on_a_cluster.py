@@ -17,29 +17,36 @@ from tests.studies.test_sweep_crashes import (
     parts_in,
     whole,
 )
-from tests.workers.test_cluster import Machines
+from tests.workers.test_cluster import Machines, cluster_inside
 
 __all__ = ["whole"]
 
 
-@pytest.fixture
-def machines(tmp_path: Path) -> Iterator[Machines]:
-    machines = Machines(tmp_path)
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
+    """A scheduler and two workers, of which tests kill what they like, one after the other."""
+    machines = Machines(tmp_path_factory.mktemp("dask"))
     yield machines
     machines.end()
 
 
-def test_a_worker_killed_among_others_changes_nothing(
-    whole: Whole, tmp_path: Path, machines: Machines
-) -> None:
+@pytest.fixture(scope="module")
+def address(machines: Machines) -> str:
     address = machines.scheduler()
-    workers = [machines.worker(address) for _ in range(2)]
+    for _ in range(2):
+        machines.worker(address)
+    return address
+
+
+def test_a_worker_killed_among_others_changes_nothing(
+    whole: Whole, tmp_path: Path, machines: Machines, address: str
+) -> None:
     out = tmp_path / "out"
     killed: list[int] = []
 
     def kill_one(done: int, _all: int) -> None:
         if done and not killed:
-            workers[0].kill()
+            machines.started[1].kill()
             killed.append(done)
 
     done = sweep(whole.plan, out, client=address, progress=kill_one)
@@ -49,10 +56,8 @@ def test_a_worker_killed_among_others_changes_nothing(
 
 
 def test_with_another_scheduler_it_goes_on(
-    whole: Whole, tmp_path: Path, machines: Machines
+    whole: Whole, tmp_path: Path, machines: Machines, address: str
 ) -> None:
-    address = machines.scheduler()
-    machines.worker(address)
     out = tmp_path / "out"
 
     def kill_the_scheduler(done: int, _all: int) -> None:
@@ -64,7 +69,6 @@ def test_with_another_scheduler_it_goes_on(
     kept = parts_in(out)
     assert 0 < len(kept) < CHUNKS
     assert_finished_chunks_are_whole(out, whole)
-    another = machines.scheduler()
-    machines.worker(another)
-    assert sweep(whole.plan, out, client=another).made == CHUNKS - len(kept)
+    with cluster_inside() as another:
+        assert sweep(whole.plan, out, client=another).made == CHUNKS - len(kept)
     assert_is_whole(out, whole)

@@ -62,13 +62,14 @@ def test_every_point_is_a_walk_with_its_numbers(tmp_path: Path) -> None:
     summary, row = summarize_space(run), flexible.iloc[3]
     for name in ("speed", "peak_normal", "cost_of_transport", "deepest"):
         assert row[name] == getattr(summary, name), name
-    assert rerun(tmp_path / "rows-of-it").same
 
 
-def test_a_plan_of_walks_comes_back_from_its_manifest(tmp_path: Path) -> None:
+def test_a_plan_of_walks_comes_back_from_its_manifest_and_is_repeated(tmp_path: Path) -> None:
     ours = plan(tmp_path)
     assert Plan.revive(ours.record()).key == ours.key
-    sweep(plan(tmp_path, PLAN.replace("[60, 480]", "[60]")), tmp_path / "there")
+    few = PLAN.replace("[60, 480]", "[60]").replace("[0.3, 0.45]", "[0.3]")
+    sweep(plan(tmp_path, few), tmp_path / "there")
+    assert rerun(tmp_path / "there").same
     theirs = read_plan_of(tmp_path / "there")
     assert (
         theirs.walkers[0].numbers["servo.stiffness"] == ours.walkers[0].numbers["servo.stiffness"]
@@ -114,7 +115,7 @@ def test_walkers_change_by_dotted_name() -> None:
 
 def search(store: Path | None = None, seed: int = 1) -> Tuning:
     return tune(
-        load_robot("sc618"), "trot", 0.4, seconds=1.0, draws=3, rounds=2, children=2, seed=seed,
+        load_robot("sc618"), "trot", 0.4, seconds=1.0, draws=3, rounds=2, children=1, seed=seed,
         store=store,
     )  # fmt: skip
 
@@ -122,15 +123,15 @@ def search(store: Path | None = None, seed: int = 1) -> Tuning:
 def test_a_search_repeats_goes_on_and_gets_no_worse(tmp_path: Path) -> None:
     store = tmp_path / "kept.jsonl"
     whole = search(store)
-    assert whole.tried == 3 + 2 * 2
+    assert whole.tried == 3 + 2 * 1
     assert list(whole.history) == sorted(whole.history, reverse=True)
     assert whole.cost == whole.history[-1]
     # What is kept of a search that was interrupted is not tried again, and changes nothing.
     lines = store.read_text().splitlines(keepends=True)
-    store.write_text("".join(lines[:5]))
+    store.write_text("".join(lines[:4]))
     again = search(store)
     assert again.walk.gains == whole.walk.gains
-    assert store.read_text().splitlines(keepends=True)[:5] == lines[:5]
+    assert store.read_text().splitlines(keepends=True)[:4] == lines[:4]
     with pytest.raises(OutputError, match="other settings"):
         search(store, seed=2)
     (tmp_path / "walk.toml").write_text(walk_file(whole))
@@ -160,4 +161,4 @@ def test_a_search_for_what_cannot_be_is_refused() -> None:
         tune(robot, "trot", draws=0)
     heavy = load_robot("sc618", {"gravity": 200.0})
     with pytest.raises(NoWalkError, match="none of 3 walks lasted"):
-        tune(heavy, "trot", seconds=1.0, draws=2, rounds=1, children=1)
+        tune(heavy, "trot", seconds=0.6, draws=2, rounds=1, children=1)
