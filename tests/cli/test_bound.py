@@ -92,7 +92,7 @@ def test_a_time_can_be_given_instead_of_strides(cli: Cli) -> None:
 
 
 def test_results_are_written_and_readable(cli: Cli, tmp_path: Path) -> None:
-    done = cli("bound", "--out", "deep/results")
+    done = cli("bound", "--seconds", "0.05", "--out", "deep/results")
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "deep" / "results"
     assert {path.name for path in folder.iterdir()} == {
@@ -191,7 +191,7 @@ def begin_long_run(folder: Path) -> subprocess.Popen[str]:
             Path(sys.executable).with_name("flexspine"),
             "bound",
             "--strides",
-            "60",
+            "10",
             "--out",
             "results",
         ],
@@ -239,9 +239,10 @@ def test_an_interrupt_while_starting_is_no_traceback(tmp_path: Path, delay: floa
 
 
 def test_pictures_of_an_earlier_run_do_not_stay(cli: Cli, tmp_path: Path) -> None:
-    assert cli("bound", "--seconds", "0.05", "--out", "results").returncode == 0
+    short = ("bound", "--seconds", "0.05", "--out", "results")
+    assert cli(*short).returncode == 0
     assert (tmp_path / "results" / "animation.gif").exists()
-    assert cli("bound", "--out", "results", "--no-animation").returncode == 0
+    assert cli(*short, "--no-animation").returncode == 0
     assert not (tmp_path / "results" / "animation.gif").exists()
 
 

@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from matplotlib.figure import Figure
+from PIL import Image
 
+from flexspine.report import figure
 from tests.cli.conftest import COMMAND, Cli, Result, run_here
 
 FIELDS = {
@@ -43,14 +46,16 @@ class Found(NamedTuple):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
-    """The gaits at the speed of the published one; the folder held older files."""
+    """The gaits at the speed of the published one, undrawn; the folder held older files."""
     folder = tmp_path_factory.mktemp("search")
     for name in ("gait-77.json", "gait-77.png", "gait-mine.json"):
         (folder / name).write_text("older")
-    done = run_here(
-        "gait", "--preset", "kamimura2015-flexible", "--set", "spine.stiffness=260",
-        "--energy", "290", "--height", "0.32", "--speed", "4.5", "--out", folder, "--json",
-    )  # fmt: skip
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(figure, "plot_run", lambda _dataset: Figure())
+        done = run_here(
+            "gait", "--preset", "kamimura2015-flexible", "--set", "spine.stiffness=260",
+            "--energy", "290", "--height", "0.32", "--speed", "4.5", "--out", folder, "--json",
+        )  # fmt: skip
     return Found(done, json.loads(done.stdout), folder)
 
 
@@ -203,6 +208,8 @@ def test_a_damped_gait_is_found_with_what_keeps_it_going(cli: Cli, tmp_path: Pat
     record = json.loads((tmp_path / "damped" / "gaits.json").read_text())
     assert record["free"] == ["legs.extension"]
     (gait,) = record["gaits"]
+    with Image.open(tmp_path / "damped" / "gait-1.png") as picture:
+        assert len(picture.getcolors(picture.width * picture.height) or ()) > 100, "it is drawn"
     run = json.loads(cli("bound", "--gait", "damped/gait-1.json", "--json").stdout)
     assert run["energy"]["relative_drift"] < 1e-12
     assert run["apexes"][-1]["height"] == pytest.approx(0.32, abs=1e-10)
