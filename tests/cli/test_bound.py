@@ -239,11 +239,14 @@ def test_an_interrupt_while_starting_is_no_traceback(tmp_path: Path, delay: floa
 
 
 def test_pictures_of_an_earlier_run_do_not_stay(cli: Cli, tmp_path: Path) -> None:
-    short = ("bound", "--seconds", "0.05", "--out", "results")
-    assert cli(*short).returncode == 0
-    assert (tmp_path / "results" / "animation.gif").exists()
-    assert cli(*short, "--no-animation").returncode == 0
-    assert not (tmp_path / "results" / "animation.gif").exists()
+    folder = tmp_path / "results"
+    folder.mkdir()
+    for name in ("animation.gif", "animation.mp4", "mine.gif"):
+        (folder / name).write_text("older")
+    done = cli("bound", "--seconds", "0.05", "--out", "results", "--no-animation")
+    assert done.returncode == 0
+    assert {path.name for path in folder.iterdir() if path.read_bytes() == b"older"} == {"mine.gif"}
+    assert not list(folder.glob("animation.*"))
 
 
 def test_a_reader_that_goes_away_brings_no_complaint(tmp_path: Path) -> None:

@@ -116,7 +116,8 @@ def test_people_are_told_what_came_of_it_and_programs_too(cli: Cli, tmp_path: Pa
 
 
 def test_progress_is_shown_to_a_person_and_not_in_the_result(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN)
+    one = PLAN.replace('["scout2", "kamimura2015-flexible"]', '"scout2"')
+    (tmp_path / "plan.toml").write_text(one)
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
         [COMMAND, "sweep", "plan.toml", "--out", "out", "--processes", "1", "--json"],
@@ -132,9 +133,9 @@ def test_progress_is_shown_to_a_person_and_not_in_the_result(tmp_path: Path) -> 
             shown += read
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert json.loads(output)["made"] == 6
+    assert json.loads(output)["made"] == 3
     assert b"points" in shown
-    assert b"/20" in shown
+    assert b"/10" in shown
 
 
 def test_the_example_is_a_million_strides() -> None:
