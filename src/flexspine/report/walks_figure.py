@@ -79,7 +79,8 @@ def _draw(axes: Axes, found: WalkMap, name: str) -> None:
         )  # fmt: skip
     if name == "speed":
         axes.plot(found.speeds, found.speeds, color=INK, linewidth=0.6, linestyle=":")
-    axes.set_ylim(bottom=min(0.0, 1.1 * float(np.nanmin(table))) if name == "speed" else 0)
+    backward = 1.1 * float(np.nanmin(table, initial=0.0))
+    axes.set_ylim(bottom=backward if name == "speed" else 0)
     for body, marked in found.fell.items():
         colors = _shades(found) if body == "flexible" else [INK] * len(found.stiffnesses)
         for j, color in enumerate(colors):

@@ -164,8 +164,8 @@ def tune(
     lasting = int((costs < FALL).sum())
     if not lasting:
         raise NoWalkError(
-            f"none of {len(costs)} walks lasted {seconds:g} s",
-            "draw more of them, or ask for another speed",
+            f"none of {len(costs)} walks lasted {seconds:g} s, with whole strides to judge it by",
+            "draw more of them, let them walk longer, or ask for another speed",
         )
     best, told = int(costs.argmin()), f"found by a search with seed {seed} at {speed:g} m/s"
     walk = _walk(rhythm, _numbers(ranges, shares[best]), told)
