@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from scipy.optimize import brentq
 
 from flexspine.gaits.family import (
     BRANCHING,
@@ -120,6 +119,8 @@ class Segment:
                     raise LookupError
                 found[distance] = point
             return found[distance].tests[test]
+
+        from scipy.optimize import brentq  # half a second, which workers of sweeps need not wait
 
         try:
             where = brentq(value, 0.0, self.length, xtol=LOCATED, rtol=FINEST)

@@ -217,21 +217,15 @@ def _free(box: Bbox, spots: Array, taken: list[Bbox], drawn: Array) -> Array:
     size = np.array([box.width, box.height])
     ways = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     around = np.column_stack([np.cos(ways), np.sin(ways)])
-    best: Array = spots[0]
-    least = np.inf
-    for far in (0.62, 0.8, 1.0, 1.3, 1.7, 2.2, 2.8):
-        shifts = around * (size * [0.62, 0.8] + 14 * (far - 0.5))
-        for shift in shifts:
-            for number, spot in enumerate(spots):
-                at = spot + shift
-                low, high = at - size / 2, at + size / 2
-                hidden = int(((drawn > low) & (drawn < high)).all(axis=1).sum())
-                over = sum(
-                    bool((low < each.max).all() and (high > each.min).all()) for each in taken
-                )
-                cost = 1000 * over + 10 * hidden + 12 * far + 0.2 * number
-                if cost < least:
-                    best, least = at, cost
+    far = np.array([0.62, 0.8, 1.0, 1.3, 1.7, 2.2, 2.8])[:, None, None]
+    shifts = around * (size * [0.62, 0.8] + 14 * (far - 0.5))
+    places = shifts[:, :, None] + spots
+    low, high = (places[..., None, :] + side * size / 2 for side in (-1, 1))
+    hidden = ((drawn > low) & (drawn < high)).all(axis=-1).sum(axis=-1)
+    corners = np.array([[each.min, each.max] for each in taken]).reshape(-1, 2, 2)
+    over = ((low < corners[:, 1]) & (high > corners[:, 0])).all(axis=-1).sum(axis=-1)
+    cost = 1000 * over + 10 * hidden + 12 * far + 0.2 * np.arange(len(spots))
+    best: Array = places.reshape(-1, 2)[cost.argmin()]
     return best
 
 
