@@ -22,7 +22,7 @@ test: $(VENV)/.installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n auto --dist loadfile
-	FLEXSPINE_CACHE_DIR=$(CURDIR)/.pytest_cache/d/compiled $(MAKE) docs  # much is compiled there
+	FLEXSPINE_OPTIMIZATION=0 FLEXSPINE_CACHE_DIR=$(CURDIR)/.pytest_cache/d/compiled $(MAKE) docs  # much is compiled there
 
 # Runs its examples and pages of code; fails on any warning, such as a broken link.
 docs: $(VENV)/.installed-dev

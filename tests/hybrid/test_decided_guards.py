@@ -245,3 +245,30 @@ def test_a_ball_that_bounces_in_numbers_chatters_too() -> None:
     assert run.outcome.name == "chattered"
     assert run.end.time == pytest.approx(FALL * 3, abs=0.02)
     assert run.end.time <= FALL * 3
+
+
+@pytest.mark.parametrize("record", [False, True])
+@pytest.mark.parametrize("guard", [SYMBOLIC, DECIDED], ids=["expressions", "numbers"])
+def test_no_ball_falls_through_the_floor(guard: Guard, record: bool) -> None:
+    """Whichever side of zero rounding leaves it on, from bounces of 1 m to those of 1 nm."""
+    rng = np.random.default_rng(0)
+    for height, restitution in zip(rng.uniform(0.5, 2, 60), rng.uniform(0.3, 0.7, 60), strict=True):
+        run = drop(guard, height=height, restitution=restitution, end_time=10.0, record=record)
+        assert run.outcome.name == "chattered"
+        rest = math.sqrt(2 * height / 9.81) * (1 + restitution) / (1 - restitution)
+        assert rest - 0.02 < run.end.time <= rest
+
+
+@pytest.mark.parametrize("record", [False, True])
+@pytest.mark.parametrize("speed", [1e-3, 0.3, 1.75, 20.0])
+def test_what_leaves_a_guard_from_exactly_zero_comes_back_to_it(speed: float, record: bool) -> None:
+    bound = BoundSystem(compile_system(ball(SYMBOLIC), 1e-15), np.array([9.81, 0.5, 0.0]))
+    start = HybridState(0.0, "flight", np.array([0.0, speed, 0.0]), np.zeros(2))
+    back = 2 * speed / 9.81
+    run = integrate(bound, start, end_time=1.2 * back, record=record)
+    assert [event.time for event in run.events] == pytest.approx([back], rel=1e-12)
+    if record:
+        times = np.linspace(0, back, 50)
+        (first, *_) = run.arcs
+        expected = speed * times - 9.81 * times**2 / 2
+        assert first(times)[:, 0] == pytest.approx(expected, abs=1e-14 * max(1.0, speed))

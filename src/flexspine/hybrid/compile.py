@@ -7,6 +7,7 @@ jump would lead to: the state after it and the guards of the mode it leads into.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,13 +18,17 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from flexspine.errors import InputError
 from flexspine.hybrid.cache import mend_cache, open_cache
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.system import Arming, Guard, HybridSystem, Mode
 
 Array = NDArray[np.float64]
 
-# LLVM's level of optimization, of 3. Higher ones take up to twice as long and gain nothing here.
+# LLVM's level of optimization, 0 to 3.
+EFFORT_VARIABLE = "FLEXSPINE_OPTIMIZATION"
+
+# Higher levels take up to twice as long and gain nothing here.
 EFFORT = 1
 
 # What large systems evaluate now and then only takes longer to optimize than it ever runs.
@@ -78,6 +83,7 @@ class CompiledMode:
         coefficients: Any,
         kernel: Any,
         jumps: tuple[Jump, ...],
+        large: bool,
     ) -> None:
         self.mode = mode
         self.integrator = integrator
@@ -97,6 +103,8 @@ class CompiledMode:
         self.state: Array = integrator.state
         self.numbers: Array = integrator.pars
         self.owner: object = None
+        # Its own steps are of any length.
+        self.endless = not large and is_polynomial(mode)
 
 
 class CompiledSystem:
@@ -105,7 +113,8 @@ class CompiledSystem:
     def __init__(self, system: HybridSystem, tolerance: float) -> None:
         self.system = system
         self.tolerance = tolerance
-        self._effort = NONE if system.large else EFFORT
+        self.effort = effort()
+        self._seldom = NONE if system.large else self.effort
         self._modes: dict[str, CompiledMode] = {}
         self._observables: dict[str, Any] = {}
         self._lowerings: dict[str, Lowering] = {}
@@ -132,7 +141,7 @@ class CompiledSystem:
                 [lower(expr) for expr in mode.observables.values()],
                 self._variables,
                 compact=self.system.large,
-                effort=self._effort,
+                level=self._seldom,
             )
             self._observables[name] = (tuple(mode.observables), function)
         names, function = self._observables[name]
@@ -153,12 +162,12 @@ class CompiledSystem:
             tol=self.tolerance,
             t_events=events,
             compact_mode=system.large,
-            opt_level=EFFORT,
+            opt_level=self.effort,
         )
         kernel, jumps = self._event_kernel(mode)
         # Folding a large system takes longer than it saves.
         coefficients = _as_they_are if system.large else self.coefficients(lower.coefficients)
-        return CompiledMode(mode, integrator, coefficients, kernel, jumps)
+        return CompiledMode(mode, integrator, coefficients, kernel, jumps, system.large)
 
     def coefficients(self, expressions: list[sp.Expr]) -> Any:
         """Compile the folded expressions as a function of the parameters."""
@@ -192,7 +201,7 @@ class CompiledSystem:
                     due=_due(target, mode),
                 )
             )
-        kernel = compile_expressions(outputs, self._variables, effort=self._effort)
+        kernel = compile_expressions(outputs, self._variables, level=self._seldom)
         return kernel, tuple(jumps)
 
     def after(self, mode: Mode, guard: Guard) -> tuple[list[Any], list[Any]]:
@@ -254,15 +263,39 @@ class CompiledSystem:
 
 
 def compile_expressions(
-    outputs: list[Any], variables: list[Any], *, compact: bool = False, effort: int = EFFORT
+    outputs: list[Any], variables: list[Any], *, compact: bool = False, level: int | None = None
 ) -> Any:
     """Compile expressions; a function of nothing or to nothing gets one zero to work on."""
     return hy.cfunc(
         outputs or [hy.expression(0.0)],
         vars=variables or [hy.expression("unused")],
         compact_mode=compact,
-        opt_level=effort,
+        opt_level=effort() if level is None else level,
     )
+
+
+def effort() -> int:
+    """LLVM's level of optimization: ``$FLEXSPINE_OPTIMIZATION``, or the usual one.
+
+    Raises `InputError` for what is no level.
+    """
+    asked = os.environ.get(EFFORT_VARIABLE, "")
+    if asked not in ("", "0", "1", "2", "3"):
+        raise InputError(f"{EFFORT_VARIABLE} = '{asked}' is no level", "set it to 0, 1, 2 or 3")
+    return int(asked or EFFORT)
+
+
+def is_polynomial(mode: Mode) -> bool:
+    """Whether a field is polynomial in the states, so that its series may come to an end."""
+    moving = set(mode.field)
+    for symbol, expression in mode.definitions.items():
+        if expression.free_symbols & moving:
+            moving.add(symbol)
+    reached = [sp.sympify(rate) for rate in mode.field.values()]
+    for expression in reached:
+        named = [mode.definitions[s] for s in expression.free_symbols if s in mode.definitions]
+        reached += [each for each in named if each not in reached]
+    return all(expression.is_polynomial(*moving) for expression in reached)
 
 
 def _as_they_are(parameters: Array) -> Array:

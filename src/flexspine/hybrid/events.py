@@ -35,6 +35,10 @@ ROUNDING = 64 * np.finfo(float).eps
 # event by more than SIMULTANEITY.
 GRAZING_RATE = 1e-4
 
+# s; heyoka may find no root in a step that begins where the guard is zero. Where steps are of any
+# length the first is this long: so soon a guard comes back in chatter only, which has ended before.
+LEAVING = 1e-9
+
 # One guard firing this often within the system's window is chatter.
 CHATTER_EVENTS = 8
 RECENT_EVENTS = 4 * CHATTER_EVENTS
@@ -106,6 +110,12 @@ class Progress:
         """Fire what is due at an instant at which no root was looked for."""
         mode = self.bound.mode(self.mode)
         self._settle(mode, mode.evaluate(self.states, self.held))
+
+    def leaves_a_guard(self, mode: BoundMode) -> bool:
+        """Whether a guard of the present mode is zero and rising."""
+        numbers = mode.evaluate(self.states, self.held)[mode.code.guards].tolist()
+        pairs = zip(numbers[::2], numbers[1::2], strict=True)
+        return any(abs(value) < LEAVING * rate for value, rate in pairs)
 
     def happen(self, jump: Jump, mode: BoundMode) -> bool:
         """Let a guard fire that the integrator has located; False: nothing came of it.

@@ -10,7 +10,7 @@ import heyoka as hy
 import numpy as np
 
 from flexspine.hybrid.bound import BoundSystem
-from flexspine.hybrid.events import Firing, Progress
+from flexspine.hybrid.events import LEAVING, Firing, Progress
 from flexspine.hybrid.grazing import touches_without_crossing
 from flexspine.hybrid.outcome import COMPLETED, DIVERGED, GRAZED, TIMED_OUT, Outcome
 from flexspine.hybrid.system import Section
@@ -45,6 +45,10 @@ def integrate(
     """
     progress = Progress(bound, start, section or bound.system.section, crossings, before)
     return _Integration(progress, end_time, section_timeout, max_steps, record).go()
+
+
+# How steps end at which nothing happens.
+_UNDER_WAY = (hy.taylor_outcome.success, hy.taylor_outcome.time_limit)
 
 
 class _Integration:
@@ -98,8 +102,11 @@ class _Integration:
         code = mode.code
         jumps = code.jumps
         advance = self._advance_recording if self.record else self._advance
+        leaves = code.endless and progress.leaves_a_guard(mode)
+        longest = LEAVING if leaves else inf
         while True:
-            result = advance(integrator)
+            result = advance(integrator, longest)
+            longest = inf
             if progress.outcome is not None:
                 return
             if result == hy.taylor_outcome.err_nf_state:
@@ -115,15 +122,20 @@ class _Integration:
             if progress.happen(jumps[index], mode):
                 return
 
-    def _advance(self, integrator: Any) -> Any:
+    def _advance(self, integrator: Any, longest: float) -> Any:
+        """Advance to the next event; the first step is at most ``longest`` (s)."""
         if self.steps_left <= 0:
             return hy.taylor_outcome.step_limit
+        if longest < self.limit - integrator.time:
+            result, _ = integrator.step(longest)
+            self._count(1)
+            if result not in _UNDER_WAY:
+                return result
         result, _, _, steps, _, _ = integrator.propagate_until(self.limit, self.steps_left)
-        self.steps += steps
-        self.steps_left -= steps
+        self._count(steps)
         return result
 
-    def _advance_recording(self, integrator: Any) -> Any:
+    def _advance_recording(self, integrator: Any, longest: float) -> Any:
         """Advance step by step and keep the Taylor series of each."""
         times, series = [integrator.time], []
         result = hy.taylor_outcome.success
@@ -131,16 +143,23 @@ class _Integration:
             if self.steps_left <= 0:
                 result = hy.taylor_outcome.step_limit
                 break
-            result, _ = integrator.step(self.limit - integrator.time, write_tc=True)
+            left = self.limit - integrator.time
+            result, _ = integrator.step(min(left, longest), write_tc=True)
+            if longest < left and result in _UNDER_WAY:
+                result = hy.taylor_outcome.success
+            longest = inf
             if integrator.time > times[-1]:
-                self.steps += 1
-                self.steps_left -= 1
+                self._count(1)
                 times.append(integrator.time)
                 series.append(integrator.tc.copy())
         if series:
             progress = self.progress
             self._keep(Arc(progress.mode, progress.held, np.array(times), np.array(series)))
         return result
+
+    def _count(self, steps: int) -> None:
+        self.steps += steps
+        self.steps_left -= steps
 
     def _keep(self, arc: Arc) -> None:
         """Keep an arc; if a guard touches zero within it without crossing, end the run there."""

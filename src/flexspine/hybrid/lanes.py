@@ -12,13 +12,11 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-import sympy as sp
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import EFFORT, Array, CompiledSystem
+from flexspine.hybrid.compile import Array, CompiledSystem, is_polynomial
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.step_events import StepEvents
-from flexspine.hybrid.system import Mode
 
 # Bytes; the Taylor coefficients of all terms of all lanes of an integrator stay in fast memory.
 COEFFICIENTS = 130_000
@@ -47,7 +45,7 @@ class LaneMode:
         lower = Lowering(known, system.parameters, mode.definitions, len(held))
         rates = {s: lower(mode.field[s]) for s in system.states}
         field = list(zip(states, rates.values(), strict=True))
-        if _is_polynomial(mode):
+        if is_polynomial(mode):
             # Its own steps are of any length; its guards come along, to be resolved by steps.
             for i, guard in enumerate(mode.guards):
                 value = lower(guard.expression)
@@ -58,7 +56,7 @@ class LaneMode:
             field,
             np.zeros((len(field), self.width)),
             tol=compiled.tolerance,
-            opt_level=EFFORT,
+            opt_level=compiled.effort,
         )
         self._coefficients = compiled.coefficients(lower.coefficients)
         # Code that needs few numbers may not reach as far as all held variables.
@@ -128,19 +126,6 @@ class LaneMode:
             pars[n:] = folded[0, :, None]
             return _blocks(held[:n], self.width)
         return _blocks(np.concatenate([held[:n], folded.T]), self.width)
-
-
-def _is_polynomial(mode: Mode) -> bool:
-    """Whether a field is polynomial in the states, so that its series may come to an end."""
-    moving = set(mode.field)
-    for symbol, expression in mode.definitions.items():
-        if expression.free_symbols & moving:
-            moving.add(symbol)
-    reached = [sp.sympify(rate) for rate in mode.field.values()]
-    for expression in reached:
-        named = [mode.definitions[s] for s in expression.free_symbols if s in mode.definitions]
-        reached += [each for each in named if each not in reached]
-    return all(expression.is_polynomial(*moving) for expression in reached)
 
 
 def _width(integrator: Any) -> int:

@@ -20,7 +20,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import EFFORT, CompiledSystem, compile_expressions
+from flexspine.hybrid.compile import CompiledSystem, compile_expressions
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.system import Guard, Mode
 
@@ -120,7 +120,7 @@ class TangentCode:
             np.zeros((2 * n, LANES)),
             tol=self.compiled.tolerance,
             compact_mode=sum(len(rate) for _, rate in field) > LARGE,
-            opt_level=EFFORT,
+            opt_level=self.compiled.effort,
         )
         # Code that needs few numbers may not reach as far as all held variables.
         reach = len(integrator.pars)
