@@ -18,9 +18,9 @@ import json
 from flexspine import examine, floquet_multipliers, load_model, simulate_many
 gait = examine(load_model("kamimura2015-flexible"))
 found = [gait.period, *gait.peak_grf.values()]
-found += sorted(abs(floquet_multipliers(gait).multipliers))
 many = simulate_many(load_model("scout2"), {"height": [0.32, 0.325, 0.33]})
 found += [*many["duration"], *many["energy_end"], *many["peak_grf_fore"]]
+found += sorted(abs(floquet_multipliers(gait).multipliers))  # the last six
 print(json.dumps([float(number) for number in found]))
 """
 
@@ -38,10 +38,11 @@ def numbers(level: str) -> list[float]:
 
 
 def test_the_usual_level_computes_what_plain_code_does() -> None:
-    """A multiplier that is exactly one, twice, is known to the root of rounding only."""
+    """Multipliers to their error bars: a double one is known to the root of rounding only."""
     plain, usual = numbers("0"), numbers("")
     assert len(usual) >= 18
-    assert usual == pytest.approx(plain, rel=1e-7, abs=1e-9)
+    assert usual[:-6] == pytest.approx(plain[:-6], rel=1e-10)
+    assert usual[-6:] == pytest.approx(plain[-6:], rel=1e-7, abs=1e-9)
 
 
 @pytest.mark.parametrize("level", ["0", "3"])

@@ -32,7 +32,7 @@ EFFORT_VARIABLE = "FLEXSPINE_OPTIMIZATION"
 EFFORT = 1
 
 # What large systems evaluate now and then only takes longer to optimize than it ever runs.
-NONE = 0
+SELDOM = 0
 
 
 class Due(NamedTuple):
@@ -73,6 +73,7 @@ class CompiledMode:
 
     ``state`` and ``numbers`` are the integrator's own memory: its state and its parameters, which
     are the held variables and then the coefficients: parameters, or what was folded of them.
+    ``endless``: its steps may be of any length.
     ``owner`` is the `flexspine.hybrid.bound.BoundMode` whose coefficients stand there now.
     """
 
@@ -83,7 +84,7 @@ class CompiledMode:
         coefficients: Any,
         kernel: Any,
         jumps: tuple[Jump, ...],
-        large: bool,
+        endless: bool,
     ) -> None:
         self.mode = mode
         self.integrator = integrator
@@ -103,8 +104,7 @@ class CompiledMode:
         self.state: Array = integrator.state
         self.numbers: Array = integrator.pars
         self.owner: object = None
-        # Its own steps are of any length.
-        self.endless = not large and is_polynomial(mode)
+        self.endless = endless
 
 
 class CompiledSystem:
@@ -114,7 +114,7 @@ class CompiledSystem:
         self.system = system
         self.tolerance = tolerance
         self.effort = effort()
-        self._seldom = NONE if system.large else self.effort
+        self._seldom = SELDOM if system.large else self.effort
         self._modes: dict[str, CompiledMode] = {}
         self._observables: dict[str, Any] = {}
         self._lowerings: dict[str, Lowering] = {}
@@ -167,7 +167,8 @@ class CompiledSystem:
         kernel, jumps = self._event_kernel(mode)
         # Folding a large system takes longer than it saves.
         coefficients = _as_they_are if system.large else self.coefficients(lower.coefficients)
-        return CompiledMode(mode, integrator, coefficients, kernel, jumps, system.large)
+        endless = not system.large and _is_polynomial(mode)
+        return CompiledMode(mode, integrator, coefficients, kernel, jumps, endless)
 
     def coefficients(self, expressions: list[sp.Expr]) -> Any:
         """Compile the folded expressions as a function of the parameters."""
@@ -285,7 +286,7 @@ def effort() -> int:
     return int(asked or EFFORT)
 
 
-def is_polynomial(mode: Mode) -> bool:
+def _is_polynomial(mode: Mode) -> bool:
     """Whether a field is polynomial in the states, so that its series may come to an end."""
     moving = set(mode.field)
     for symbol, expression in mode.definitions.items():

@@ -14,7 +14,7 @@ import heyoka as hy
 import numpy as np
 
 from flexspine.hybrid.cache import mend_cache
-from flexspine.hybrid.compile import Array, CompiledSystem, is_polynomial
+from flexspine.hybrid.compile import Array, CompiledSystem
 from flexspine.hybrid.lowering import Lowering
 from flexspine.hybrid.step_events import StepEvents
 
@@ -45,8 +45,8 @@ class LaneMode:
         lower = Lowering(known, system.parameters, mode.definitions, len(held))
         rates = {s: lower(mode.field[s]) for s in system.states}
         field = list(zip(states, rates.values(), strict=True))
-        if is_polynomial(mode):
-            # Its own steps are of any length; its guards come along, to be resolved by steps.
+        if self.code.endless:
+            # Its guards come along, to be resolved by steps.
             for i, guard in enumerate(mode.guards):
                 value = lower(guard.expression)
                 slope = [hy.diff(value, v) * rate for v, rate in field[: len(states)]]
