@@ -19,7 +19,7 @@ run: $(VENV)/.installed
 test: $(VENV)/.installed-dev
 	$(BIN)/ruff check src tests benchmarks examples $(SITE)
 	$(BIN)/ruff format --check src tests benchmarks examples $(SITE)
-	$(BIN)/mypy
+	$(BIN)/mypy --num-workers auto
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n auto --dist loadfile
 	FLEXSPINE_OPTIMIZATION=0 FLEXSPINE_CACHE_DIR=$(CURDIR)/.pytest_cache/d/compiled $(MAKE) docs  # much is compiled there
@@ -61,7 +61,7 @@ $(VENV)/.installed: $(VENV)/bin/python pyproject.toml
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'  # what is never imported need not be compiled
 	touch $@ $(VENV)/.installed
 
 clean:

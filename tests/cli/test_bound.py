@@ -108,6 +108,17 @@ def test_results_are_written_and_readable(cli: Cli, tmp_path: Path) -> None:
     assert "deep/results" in done.stdout
 
 
+def test_a_missing_ffmpeg_is_told_before_anything_is_simulated(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/no/such/ffmpeg")
+    done = cli("bound", "--seconds", "0.01", "--out", "run")
+    assert done.returncode == 3
+    assert "--no-animation" in done.stderr
+    assert not (tmp_path / "run").exists()
+    assert cli("bound", "--seconds", "0.01", "--out", "run", "--no-animation").returncode == 0
+
+
 def test_a_run_that_fell_is_written_too(cli: Cli, tmp_path: Path) -> None:
     done = cli("bound", "--touchdown", "fore=-0.3", "--out", "fallen", "--no-animation")
     assert done.returncode == 1

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from flexspine.studies import self_check
+from flexspine.cli import self_check
 from tests.cli.conftest import Cli
 
 CHECKS = ["flexspine", "packages", "extra engine", "extra cluster", "compiled code"]

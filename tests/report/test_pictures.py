@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
+import subprocess
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from flexspine import (
     Model,
@@ -76,17 +78,45 @@ def test_no_text_of_a_figure_runs_over_another(preset: Model) -> None:
     assert_no_text_overlaps(figure_of(preset.name))
 
 
-@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
-def test_an_animation_has_frames_of_one_size(data: xr.Dataset, tmp_path: Path, suffix: str) -> None:
-    file = tmp_path / f"run{suffix}"
+def frames_of(video: Path, width: int, height: int) -> np.ndarray:
+    read = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(video)]
+    raw = [*read, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(raw, capture_output=True, check=True)
+    return np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
+
+
+def test_animations_have_the_frames_of_one_drawing(data: xr.Dataset, tmp_path: Path) -> None:
+    gif, video = tmp_path / "run.gif", tmp_path / "run.mp4"
     seen: list[float] = []
-    animate(data.isel(time=slice(0, 60)), file, progress=seen.append)
-    assert file.stat().st_size > 10_000
-    assert seen == sorted(seen)
+    animate(data.isel(time=slice(0, 60)), gif, video, progress=seen.append)
+    assert seen == sorted(set(seen))
     assert seen[-1] == pytest.approx(1.0)
-    if suffix == ".gif":
-        with Image.open(file) as image:
-            assert image.n_frames >= 10
+    with Image.open(gif) as image:
+        assert image.n_frames == len(seen) >= 10
+        assert image.info["duration"] == 40
+        frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(image)]
+        filmed = frames_of(video, *image.size)
+    assert len(filmed) == len(frames)
+    for left, right in zip(filmed, frames, strict=True):
+        assert np.abs(left.astype(float) - right).mean() < 3  # of 255
+    assert imageio_ffmpeg.count_frames_and_secs(str(video))[1] == pytest.approx(len(seen) / 25)
+
+
+def test_pictures_of_odd_sizes_become_a_film(tmp_path: Path) -> None:
+    write_film([np.zeros((9, 15, 3), np.uint8)] * 2, [tmp_path / "run.mp4"], fps=25, count=2)
+    assert frames_of(tmp_path / "run.mp4", 14, 8).shape == (2, 8, 14, 3)
+
+
+def test_what_the_encoder_says_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    encoder = tmp_path / "encoder"
+    encoder.write_text("#!/bin/sh\necho no such codec >&2\nexit 1\n")
+    encoder.chmod(0o755)
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(encoder))
+    pictures = [np.zeros((480, 640, 3), np.uint8)] * 4
+    for count in (1, 4):  # it may end before all pictures are with it
+        with pytest.raises(MachineError, match="no such codec"):
+            write_film(pictures[:count], [tmp_path / "run.mp4"], fps=25, count=count)
+    assert list(tmp_path.iterdir()) == [encoder]
 
 
 def test_a_strip_is_drawn_for_every_preset(preset: Model, tmp_path: Path) -> None:

@@ -103,7 +103,9 @@ def bound(
         )
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = (
+            None if out is None else stack.enter_context(ResultDirectory(out, films=animation))
+        )
         progress.begin("simulating")
         run = simulate(
             model,

@@ -24,7 +24,7 @@ def doctor(json: Json = False) -> int:
 
         flexspine doctor --json
     """
-    from flexspine.studies.self_check import self_check
+    from flexspine.cli.self_check import self_check
 
     interruptible()
     found = []

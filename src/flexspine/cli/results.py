@@ -28,10 +28,15 @@ class ResultDirectory:
     """A place for results; made and tried out at once, so that no run is done in vain.
 
     A context: what was made for nothing is taken away at its end. Files come with the command that
-    made them unless it ``tells`` nothing. Raises `OutputError` if it cannot be written to.
+    made them unless it ``tells`` nothing. Raises `OutputError` if it cannot be written to, and
+    `MachineError` if ``films`` are wanted and there is nothing to make them with.
     """
 
-    def __init__(self, path: Path, *, tells: bool = True) -> None:
+    def __init__(self, path: Path, *, tells: bool = True, films: bool = False) -> None:
+        if films:
+            from flexspine.report.film import video_encoder
+
+            video_encoder()
         self.path, self._tells = path, tells
         self._new = [p for p in (path, *path.parents) if not p.exists()]
         try:
@@ -174,6 +179,5 @@ def write_robot_run(
 def _write_animations(stage: Path, dataset: xr.Dataset, progress: Steps) -> None:
     from flexspine.report.animation import animate
 
-    for name in ANIMATIONS:
-        progress.begin(f"drawing {name}")
-        animate(dataset, stage / name, progress=progress.at)
+    progress.begin("animating")
+    animate(dataset, *(stage / name for name in ANIMATIONS), progress=progress.at)

@@ -83,7 +83,11 @@ def run3d(
     walker = walker_of(robot, gait, set_, lock=locked, plane=plane)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = (
+            None
+            if out is None
+            else stack.enter_context(ResultDirectory(out, films=animation or render))
+        )
         progress.begin("walking")
         run = run_in_space(
             walker.robot, walker.walk, seconds,
@@ -149,7 +153,7 @@ def _film(stage: Path, run: SpaceRun, progress: Steps) -> None:
     times = np.arange(0, run.duration, 1 / FILM_RATE)
     pictures = rendered(run, times)
     places = [stage / name for name in FILMS]
-    write_film(pictures, places, fps=FILM_RATE, count=len(times), progress=progress.at)
+    write_film(pictures, places, fps=FILM_RATE, gif_every=2, count=len(times), progress=progress.at)
 
 
 def _report(run: SpaceRun, summary: SpaceSummary) -> str:

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from math import isfinite
 from pathlib import Path
-from subprocess import CalledProcessError
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from flexspine.errors import (
-    OUT_OF_SPACE,
-    InputError,
-    MachineError,
-    OutputError,
-    ParameterError,
-)
+from flexspine.errors import ParameterError
 from flexspine.report.caption import ending, heading
-from flexspine.report.film import video_encoder
+from flexspine.report.film import write_film
 from flexspine.report.picture import Picture
 from flexspine.report.postures import Posture, postures
 from flexspine.report.robot_scene import RobotScene
@@ -40,8 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-Color = tuple[int, int, int]
 
 # Twenty-four seconds at the usual rate: enough of any run.
 MAX_FRAMES = 600
@@ -71,8 +62,8 @@ class Shown(Protocol):
 
 def animate(
     dataset: xr.Dataset,
-    path: Path,
-    *,
+    path: Path | str,
+    *others: Path | str,
     fps: int = 25,
     slow_down: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -80,51 +71,27 @@ def animate(
     """Write a run as an animated stick figure, ``slow_down`` times slower than real.
 
     If it is not given, bounders are slowed down eight times and robots not at all. A run in space
-    is shown from the right. The suffix of ``path``, .gif or .mp4, gives the format. Of a run that
-    needs more than 600 frames the last 600 are shown. ``progress`` is told the share that is done,
-    0 to 1. Raises `InputError`, among them `OutputError` for a path that cannot be written to, and
-    `MachineError` where the video encoder fails.
+    is shown from the right. The suffix of each path, .gif or .mp4, gives the format; all of them
+    come from one drawing. Of a run that needs more than 600 frames the last 600 are shown.
+    ``progress`` is told the share that is done, 0 to 1. Raises `InputError`, among them
+    `OutputError` for a path that cannot be written to, and `MachineError` where the video encoder
+    fails.
     """
     robot = is_robot(dataset)
     dataset = sagittal(dataset) if is_spatial(dataset) else dataset
     check_samples(dataset, robot=robot)
-    path = Path(path)
-    if path.suffix.lower() not in (".gif", ".mp4"):
-        raise InputError(
-            f"cannot write an animation as '{path.name}'", "give a name that ends in .gif or .mp4"
-        )
     if slow_down is None:
         slow_down = 1.0 if robot else SLOW_DOWN
     times = frame_times(drawable(dataset), fps, slow_down)
-    # Frames go to a file beside it, so that a failure leaves no half-written picture.
-    part = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
-    try:
-        part.touch()
-        video = path.suffix.lower() == ".mp4"
-        with themed({"animation.ffmpeg_path": video_encoder()} if video else None):
-            made: type[Shown] = RobotScene if robot else Scene
-            scene = made(dataset, times, slow_down)
-            writer = _writer(part, fps, scene)
-            with writer.saving(scene.figure, part, dpi=DOTS):
-                for number, posture in enumerate(scene.postures, start=1):
-                    scene.show(posture)
-                    writer.grab_frame()
-                    if progress is not None:
-                        progress(number / len(times))
-        part.replace(path)
-    except CalledProcessError as error:
-        raise MachineError(
-            f"the video encoder failed with status {error.returncode}", "write a .gif instead"
-        ) from error
-    except OSError as error:
-        if error.errno in OUT_OF_SPACE:
-            raise
-        raise OutputError(
-            f"cannot write '{path}' ({error.strerror})", "give a place that can be written to"
-        ) from error
-    finally:
-        if part.parent.is_dir():
-            part.unlink(missing_ok=True)
+    files = [Path(file) for file in (path, *others)]
+    with themed():
+        made: type[Shown] = RobotScene if robot else Scene
+        scene = made(dataset, times, slow_down)
+        scene.figure.set_dpi(DOTS)
+        write_film(
+            _pictures(scene, scene.postures), files, fps=fps, count=len(times),
+            colors=_colors(scene), progress=progress,
+        )  # fmt: skip
 
 
 def frame_times(dataset: xr.Dataset, fps: int, slow_down: float) -> Array:
@@ -143,46 +110,26 @@ def frame_times(dataset: xr.Dataset, fps: int, slow_down: float) -> Array:
     return np.clip(end - step * np.arange(count)[::-1], start, end)
 
 
-class GifWriter(PillowWriter):
-    """Puts every frame into the colours of some and those ``kept``: saves time, memory, disk."""
-
-    def __init__(self, fps: int, some: list[Image.Image], kept: list[Color]) -> None:
-        super().__init__(fps=fps)
-        montage = Image.new("RGB", (some[0].width, some[0].height * len(some)))
-        for number, picture in enumerate(some):
-            montage.paste(picture, (0, number * picture.height))
-        found = montage.quantize(256 - len(kept)).getpalette() or [255] * 3
-        palette = np.vstack([np.reshape(found, (-1, 3))[: 256 - len(kept)], kept])
-        palette[(palette > 246).all(axis=1)] = 255  # paper stays white
-        self.colors = Image.new("P", (1, 1))
-        self.colors.putpalette(palette.ravel().tolist())
-        self.pictures: list[Image.Image] = []
-
-    def grab_frame(self, **_options: Any) -> None:
-        """Add the figure as it is now."""
-        picture = _picture(self.fig)
-        self.pictures.append(picture.quantize(palette=self.colors, dither=Image.Dither.NONE))
-
-    def finish(self) -> None:
-        """Write the file, played again and again."""
-        first, *others = self.pictures
-        duration = round(1000 / self.fps)  # ms
-        first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0)
-
-
-def _picture(figure: Any) -> Image.Image:
-    figure.canvas.draw()
-    return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
-
-
-def _writer(path: Path, fps: int, scene: Shown) -> AbstractMovieWriter:
-    if path.suffix == ".mp4":
-        return FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20"])
-    some = []
-    for posture in scene.postures[:: max(1, len(scene.postures) // COLOR_SAMPLES)]:
+def _pictures(scene: Shown, shown: Iterable[Any]) -> Iterator[NDArray[np.uint8]]:
+    """Draw one posture after the other."""
+    canvas: Any = FigureCanvasAgg(scene.figure)
+    for posture in shown:
         scene.show(posture)
-        some.append(_picture(scene.figure))
-    return GifWriter(fps, some, bend_palette(32))
+        canvas.draw()
+        yield np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+
+
+def _colors(scene: Shown) -> Image.Image:
+    """An image with the palette of some frames and of the bend of the spine."""
+    some = scene.postures[:: max(1, len(scene.postures) // COLOR_SAMPLES)]
+    kept = bend_palette(32)
+    found = Image.fromarray(np.vstack(list(_pictures(scene, some)))).quantize(256 - len(kept))
+    taken = np.reshape(found.getpalette() or [255] * 3, (-1, 3))[: 256 - len(kept)]
+    palette = np.vstack([taken, kept])
+    palette[(palette > 246).all(axis=1)] = 255  # paper stays white
+    colors = Image.new("P", (1, 1))
+    colors.putpalette(palette.ravel().tolist())
+    return colors
 
 
 def strip(dataset: xr.Dataset, *, frames: int = 9) -> Figure:

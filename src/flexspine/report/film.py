@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
 from PIL import Image
 
 from flexspine.errors import OUT_OF_SPACE, InputError, MachineError, OutputError
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     Picture = NDArray[np.uint8]
 
-# Hz; a GIF counts time in hundredths of a second and is large: it takes every second picture of
-# faster films.
-GIF_RATE = 13
+QUALITY = 20  # x264's constant rate factor; 18 looks as it was drawn, each 6 halves the file
 
 
 class _Film(Protocol):
@@ -32,6 +32,9 @@ class _Film(Protocol):
     def close(self) -> None:
         """Finish the file."""
 
+    def abandon(self) -> None:
+        """Let go of everything, the film finished or not."""
+
 
 def write_film(
     pictures: Iterable[Picture],
@@ -39,28 +42,37 @@ def write_film(
     *,
     fps: int,
     count: int,
+    colors: Image.Image | None = None,
+    gif_every: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> None:
     """Write pictures of shape (height, width, 3) to files, GIF or MP4 by their suffixes.
 
-    ``progress`` is told which share of ``count`` is done. Raises `InputError`, among them
+    A GIF gets every ``gif_every``-th picture, in the palette of ``colors`` or else of the first
+    picture. ``progress`` is told which share of ``count`` is done. Raises `InputError`, among them
     `OutputError` for a path that cannot be written to, and `MachineError` where the video encoder
     fails; whatever raises leaves no file behind.
     """
-    makers: dict[str, Callable[[Path, int], _Film]] = {".gif": _Gif, ".mp4": _Video}
     for path in paths:
-        if path.suffix.lower() not in makers:
+        if path.suffix.lower() not in (".gif", ".mp4"):
             raise InputError(f"cannot write a film as '{path.name}'", "name it .gif or .mp4")
+    # Pictures go to files beside them, so that a failure leaves none half-written.
     parts = {path: path.with_name(f".{path.stem}.part{path.suffix.lower()}") for path in paths}
+    films: list[_Film] = []
     try:
-        films = [makers[part.suffix](part, fps) for part in parts.values()]
-        for number, picture in enumerate(pictures, start=1):
+        with ExitStack() as made:
+            for part in parts.values():
+                part.touch()
+                video = part.suffix == ".mp4"
+                films.append(_Video(part, fps) if video else _Gif(part, fps, gif_every, colors))
+                made.callback(films[-1].abandon)
+            for number, picture in enumerate(pictures, start=1):
+                for film in films:
+                    film.add(picture)
+                if progress is not None:
+                    progress(number / count)
             for film in films:
-                film.add(picture)
-            if progress is not None:
-                progress(number / count)
-        for film in films:
-            film.close()
+                film.close()
         for path, part in parts.items():
             part.replace(path)
     except OSError as failure:
@@ -77,9 +89,9 @@ def write_film(
 
 
 class _Gif:
-    def __init__(self, path: Path, fps: int) -> None:
-        self._path, self._every = path, 2 if fps > GIF_RATE else 1
-        self._duration = round(1000 * self._every / fps)  # ms
+    def __init__(self, path: Path, fps: int, every: int, colors: Image.Image | None) -> None:
+        self._path, self._every, self._colors = path, every, colors
+        self._duration = round(1000 * every / fps)  # ms
         self._frames: list[Image.Image] = []
         self._seen = 0
 
@@ -88,42 +100,64 @@ class _Gif:
         if (self._seen - 1) % self._every:
             return
         image = Image.fromarray(picture)
-        if not self._frames:
-            self._frames.append(image.quantize(256))
-            return
-        # The colours of the first picture will do for all of them.
-        frame = image.quantize(palette=self._frames[0], dither=Image.Dither.NONE)
-        self._frames.append(frame)
+        # The same colours in all pictures save time, memory and disk.
+        if self._colors is None:
+            self._colors = image.quantize(256)
+        self._frames.append(image.quantize(palette=self._colors, dither=Image.Dither.NONE))
 
     def close(self) -> None:
         first, *others = self._frames
         first.save(self._path, save_all=True, append_images=others, duration=self._duration, loop=0)
 
+    def abandon(self) -> None:
+        self._frames.clear()
+
 
 class _Video:
     def __init__(self, path: Path, fps: int) -> None:
-        self._path, self._fps = path, fps
-        self._writer: Any = None
+        self._path, self._fps, self._encoder = path, fps, video_encoder()
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (closed by abandon)
+        self._process: subprocess.Popen[bytes] | None = None
 
     def add(self, picture: Picture) -> None:
-        import imageio_ffmpeg
-
+        if self._process is None:
+            self._process = self._start(*picture.shape[:2])
+        assert self._process.stdin is not None
         try:
-            if self._writer is None:
-                video_encoder()
-                size = picture.shape[1], picture.shape[0]
-                self._writer = imageio_ffmpeg.write_frames(
-                    str(self._path), size, fps=self._fps, codec="libx264", quality=7,
-                    macro_block_size=2,
-                )  # fmt: skip
-                self._writer.send(None)
-            self._writer.send(np.ascontiguousarray(picture))
-        except RuntimeError as failure:
-            raise MachineError("the video encoder failed", "run it again") from failure
+            self._process.stdin.write(picture.tobytes())
+        except BrokenPipeError:
+            self.close()
 
     def close(self) -> None:
-        if self._writer is not None:
-            self._writer.close()
+        if self._process is None:
+            return
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):
+            self._process.stdin.close()
+        if self._process.wait() == 0:
+            return
+        self._said.seek(0)
+        said = self._said.read().decode(errors="replace").strip() or "it does not say why"
+        raise MachineError(
+            f"the video encoder failed ({said.splitlines()[-1]})", "write a .gif instead"
+        )
+
+    def abandon(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._said.close()
+
+    def _start(self, height: int, width: int) -> subprocess.Popen[bytes]:
+        taken = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {self._fps} -i -"
+        # The codec wants an even number of rows and columns.
+        given = f"-c:v libx264 -crf {QUALITY} -pix_fmt yuv420p -vf crop=trunc(iw/2)*2:trunc(ih/2)*2"
+        return subprocess.Popen(
+            [self._encoder, "-y", "-loglevel", "error", *taken.split(), *given.split(),
+             str(self._path.absolute())],
+            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._said,
+            start_new_session=True,  # an interrupt is for us alone
+        )  # fmt: skip
 
 
 def video_encoder() -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import re
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -119,15 +118,13 @@ def _gait() -> tuple[bool | None, str]:
 
 
 def _video() -> tuple[bool | None, str]:
-    import imageio_ffmpeg
+    from flexspine.errors import MachineError
+    from flexspine.report.film import video_encoder
 
     try:
-        found = shutil.which(imageio_ffmpeg.get_ffmpeg_exe())
-    except RuntimeError:
-        found = None
-    if found is None:
-        return None, "no ffmpeg: no videos, give --no-animation; or pip install imageio-ffmpeg"
-    return True, found
+        return True, video_encoder()
+    except MachineError as failure:
+        return None, f"{failure}; {failure.remedy}"
 
 
 def _opengl() -> tuple[bool | None, str]:
