@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache as once
 from inspect import cleandoc
 from itertools import pairwise
 from typing import Annotated, Any
@@ -173,12 +174,18 @@ def _common(
 _compose()
 
 
+@once
+def _command() -> Callable[..., Any]:
+    """The verbs with their options, which take Typer a while."""
+    return typer.main.get_command(app)
+
+
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     as_json = "--json" in arguments
     WORDS.set(tuple(arguments))
     try:
-        code = app(arguments, prog_name=COMMAND, standalone_mode=False)
+        code = _command()(arguments, prog_name=COMMAND, standalone_mode=False)
     except UsageError as failure:
         if type(failure).__name__ == "NoArgsIsHelpError":
             return 2  # the help it stands for is printed already

@@ -25,6 +25,7 @@ from flexspine.report.style import (
     TEXT_SIZE,
     VERMILION,
     add_title,
+    lay_out,
     themed,
 )
 
@@ -76,7 +77,7 @@ def plot_coordinates(robot: Robot | Model) -> Figure:
             f" $q_{{{angles + 1}}}$, $q_{{{angles + 2}}}$: where {linkage.links[0].name} starts"
         ]
         add_title(figure, f"{robot.name}: coordinates", details)
-        figure.draw_without_rendering()
+        lay_out(figure)
         drawing.write()
     return figure
 

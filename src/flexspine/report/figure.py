@@ -24,6 +24,7 @@ from flexspine.report.style import (
     SMALL_SIZE,
     add_legend,
     add_title,
+    lay_out,
     themed,
     widen,
 )
@@ -265,7 +266,7 @@ def _add_key(figure: Figure, dataset: xr.Dataset, spans: list[Span]) -> None:
             loc="outside lower left", ncols=columns, fontsize=SMALL_SIZE, columnspacing=1.6,
             handlelength=1.5,
         )  # fmt: skip
-        figure.draw_without_rendering()
+        lay_out(figure)
         if legend.get_window_extent().x1 <= figure.bbox.x1:
             return
         legend.remove()

@@ -95,7 +95,6 @@ def plot_robot(dataset: xr.Dataset, *, window: tuple[float, float] | None = None
         trunk.set_xlabel("time (s)")
         figure.align_ylabels(rest)
         add_title(figure, heading(dataset), details, wrap(early, 100) if early else ())
-        figure.draw_without_rendering()
     return figure
 
 

@@ -121,6 +121,13 @@ def add_title(
     figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - room / height))
 
 
+def lay_out(figure: Figure) -> None:
+    """Give everything its place and size, as drawing would."""
+    engine = figure.get_layout_engine()
+    assert engine is not None
+    engine.execute(figure)
+
+
 def add_legend(axes: Axes, *entries: list[Any], aside: float = 0.0) -> None:
     """Put a legend to the right of a panel, ``aside`` widths of it further where a scale stands.
 
