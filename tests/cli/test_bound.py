@@ -32,6 +32,7 @@ FIELDS = {
     "spine_range",
     "energy",
     "apexes",
+    "parameters",
     "touchdown_angles",
 }
 
@@ -72,6 +73,9 @@ def test_values_can_be_set_one_by_one(cli: Cli) -> None:
     record = json.loads(done.stdout)
     assert record["apexes"][0]["height"] == 0.33
     assert record["touchdown_angles"]["fore"] == 0.46
+    assert record["parameters"]["spine.stiffness"] == 240
+    assert record["parameters"]["gravity"] == 9.8
+    assert record["parameters"]["fore.mass"] == 10.4
 
 
 def test_a_fall_is_exit_code_1_with_advice(cli: Cli) -> None:

@@ -74,7 +74,7 @@ def test_a_seed_repeats_bit_for_bit_and_another_differs() -> None:
     assert not np.array_equal(first.samples["com"], other.samples["com"])
 
 
-@pytest.mark.parametrize(("gait", "seconds"), [("trot", 15.0), ("bound", 10.0)])
+@pytest.mark.parametrize(("gait", "seconds"), [("trot", 9.0), ("bound", 7.0)])
 def test_the_presets_walk_from_standing_without_a_fall(gait: str, seconds: float) -> None:
     run = run_in_space(load_robot("sc618"), load_walk(gait, "sc618"), seconds)
     assert run.outcome.completed

@@ -25,9 +25,9 @@ BOUND_BY_PERMISSIONS = (
 )
 
 
-def run_with(cache: Path, *prefix: str) -> str:
+def run_with(cache: Path, *prefix: str, program: str = PROGRAM) -> str:
     done = subprocess.run(
-        [*prefix, sys.executable, "-c", PROGRAM],
+        [*prefix, sys.executable, "-c", program],
         env={**os.environ, "FLEXSPINE_CACHE_DIR": str(cache)},
         capture_output=True,
         text=True,
@@ -108,6 +108,17 @@ def test_a_store_that_another_process_locks_is_left_to_it(tmp_path: Path, expect
         assert run_with(tmp_path) == expected
         holder.execute("rollback")
     assert entries(tmp_path) == compiled
+
+
+def test_what_comes_new_drives_out_the_oldest_beyond_a_limit(tmp_path: Path, expected: str) -> None:
+    limit = 200_000
+    other = PROGRAM.replace("0.01", "0.01, tolerance=1e-9")
+    told = run_with(
+        tmp_path, program=f"from flexspine.hybrid import cache as c; c.LIMIT = {limit}\n{other}"
+    )
+    assert float(told) == pytest.approx(float(expected), abs=1e-6)
+    with closing(sqlite3.connect(tmp_path / "cache.db")) as store:
+        assert 0 < store.execute("select sum(size) from cache").fetchone()[0] <= limit
 
 
 def test_a_cache_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:

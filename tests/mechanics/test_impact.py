@@ -92,7 +92,7 @@ def random_impacts(
 @pytest.mark.parametrize(("friction", "seed"), [(0.8, 1), (0.5, 2), (0.2, 3), (0.0, 4)])
 def test_random_impacts_obey_the_laws_of_contact(friction: float, seed: int) -> None:
     several = 0
-    for linkage, q, rates, feet, found in random_impacts(friction, 2500, seed):
+    for linkage, q, rates, feet, found in random_impacts(friction, 1500, seed):
         assert found.verdict is not Verdict.NONE
         several += found.verdict is Verdict.SEVERAL
         jacobian = linkage.foot_jacobian(q, feet)
@@ -116,7 +116,7 @@ def test_random_impacts_obey_the_laws_of_contact(friction: float, seed: int) -> 
         energy = linkage.kinetic_energy(q, rates)
         assert linkage.kinetic_energy(q, found.rates) <= energy * (1 + 1e-13)
     # Folded postures have more than one solution at high friction; few do.
-    assert several <= 25
+    assert several <= 15
 
 
 def test_without_sliding_solutions_are_often_missing_or_several() -> None:

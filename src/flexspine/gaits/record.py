@@ -9,6 +9,7 @@ from flexspine._version import STAMP
 from flexspine.gaits.measures import summarize
 from flexspine.models.legs import SIDES
 from flexspine.models.simulation import Run
+from flexspine.parameters import values
 
 
 def run_record(run: Run) -> dict[str, Any]:
@@ -43,6 +44,7 @@ def run_record(run: Run) -> dict[str, Any]:
         "work": {name: each._asdict() for name, each in summary.work.items()},
         "cost_of_transport": summary.cost_of_transport,
         "apexes": run.apexes,
+        "parameters": values(run.model.parameters),
         "touchdown_angles": dict(run.model.touchdown),
         "tolerance": run.tolerance,
     }

@@ -21,6 +21,9 @@ _STORE_FILES = "cache.db*"
 # A store that is locked or read-only is another matter: it is done without, never deleted.
 _SIGNS_OF_CORRUPTION = ("corrupt", "malformed", "not a database")
 
+# Bytes; a start takes the longer the larger the store is, and heyoka would keep 20 GB.
+LIMIT = 1 << 30
+
 _opened: list[Path] = []
 
 
@@ -40,6 +43,9 @@ def open_cache() -> None:
     hy.llvm_state.set_diskcache_path(directory)
     hy.llvm_state.set_diskcache_enabled(True)
     mend_cache()
+    with contextlib.suppress(RuntimeError):  # of a store that others may read and not write
+        if hy.llvm_state.get_diskcache_enabled() and hy.llvm_state.get_diskcache_limit() != LIMIT:
+            hy.llvm_state.set_diskcache_limit(LIMIT)
 
 
 def mend_cache() -> None:
