@@ -133,7 +133,10 @@ def test_bad_input_is_one_clear_line(cli: Cli, tmp_path: Path, case: str) -> Non
     assert list(tmp_path.iterdir()) == [], "nothing may be left behind"
 
 
-def test_a_speed_without_a_gait_is_exit_code_1(cli: Cli, tmp_path: Path) -> None:
+def test_a_speed_without_a_gait_is_exit_code_1(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("flexspine.studies.design.SEARCHES", 8)
     done = cli(*SMALL, "--speed", "9", "--out", "results", "--json")
     assert done.returncode == 1
     record = json.loads(done.stdout)

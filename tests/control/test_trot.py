@@ -34,8 +34,8 @@ PUSHED_AT = 3.1
 
 @cache
 def tracking(speed: float = 0.3) -> RobotRun:
-    """Twenty seconds under computed torque."""
-    return trot(ROBOT, Trot(gait=Pace(speed=speed)))
+    """Under computed torque: twenty seconds at the usual speed, twelve at others."""
+    return trot(ROBOT, Trot(seconds=20.0 if speed == 0.3 else 12.0, gait=Pace(speed=speed)))
 
 
 @cache
@@ -55,7 +55,7 @@ def limited() -> RobotRun:
 
 @cache
 def springs() -> RobotRun:
-    return trot(ROBOT, Trot(seconds=6.0, controller="pd"))
+    return trot(ROBOT, Trot(seconds=4.5, controller="pd"))
 
 
 @cache
@@ -121,10 +121,10 @@ def off(step: own.Step, arc: Arc, times: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.3, 0.4])
-def test_twenty_seconds_of_trot_keep_feet_down_and_torques_small(speed: float) -> None:
+def test_a_trot_keeps_feet_down_and_torques_small(speed: float) -> None:
     run = tracking(speed)
     assert run.outcome.completed, run.outcome
-    assert run.trajectory.duration == 20.0
+    assert run.trajectory.duration == (20.0 if speed == 0.3 else 12.0)
     data = robot_dataset(run, interval=1e-3)
     forces, stands = data["grf"].values, data["stands"].values > 0
     assert (stands.sum(axis=1) == 2).all()
@@ -154,7 +154,7 @@ def test_the_steady_speed_is_what_was_asked_for(speed: float) -> None:
     times = np.array([starts[-21], starts[-1]])
     x = robot_dataset(tracking(speed), times=times)["com"].values[:, 0]
     assert (x[1] - x[0]) / (times[1] - times[0]) == pytest.approx(speed, rel=1e-4)
-    assert len(starts) == pytest.approx(20 / 0.4, abs=1)
+    assert len(starts) == pytest.approx(tracking(speed).trajectory.duration / 0.4, abs=1)
 
 
 def test_the_same_walk_is_the_same_to_the_last_bit() -> None:
@@ -319,10 +319,10 @@ def test_feet_come_straight_down_at_the_landing_speed(speed: float) -> None:
         state = arc(np.array([arc.end]))[0]
         rates = own.foot_rates(state[:10], state[12:22], state[22:24])
         for toe in set(own.TOES) - set(arc.mode.split(" + ")):
-            if arc.end < 20:
+            if arc.end < 12:
                 assert rates[toe] == pytest.approx([0.0, -0.05], abs=2e-5)
                 count += 1
-    assert count > 80
+    assert count > 50
 
 
 def test_feet_land_ahead_of_their_hips_by_half_a_stance() -> None:

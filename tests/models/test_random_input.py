@@ -81,7 +81,7 @@ def check(preset: str, changes: dict[str, Any], apex: dict[str, float], angles: 
         assert np.all(np.isfinite(run.trajectory.end.states))
 
 
-@settings(max_examples=400)
+@settings(max_examples=300)
 @given(sane())
 def test_sane_bounders_always_end_in_an_outcome(
     case: tuple[str, dict[str, Any], dict[str, float], dict[str, float]],

@@ -103,9 +103,7 @@ def bound(
         )
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = (
-            None if out is None else stack.enter_context(ResultDirectory(out, films=animation))
-        )
+        directory = ResultDirectory.within(stack, out, films=animation)
         progress.begin("simulating")
         run = simulate(
             model,

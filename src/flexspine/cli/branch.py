@@ -109,7 +109,7 @@ def branch(
         start = starting_gait(gait, preset, set_, symmetric, progress)
         begin = _value(start, over)
         fixed = _kept(start, over, keep)
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         store = None if out is None else out / TRACE
         resumed = store if store is not None and store.exists() else None
         try:

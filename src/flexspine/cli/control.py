@@ -99,9 +99,7 @@ def control(
         start = starting_gait(gait, preset, set_, None, progress)
         progress.begin("designing the feedback")
         found = stabilizer_of(start, steer, method, once, effort)
-        directory = (
-            None if out is None else stack.enter_context(ResultDirectory(out, films=animation))
-        )
+        directory = ResultDirectory.within(stack, out, films=animation)
         model = start.model
         if push:
             speed = model.apex["speed"] + push / model.mass

@@ -116,7 +116,7 @@ def gait(
     bounds = _ranges("--within", within)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         progress.begin("looking for gaits")
         found = find_gaits(
             model,

@@ -94,7 +94,7 @@ def limits(
             raise UnknownNameError("limit", name, names)
     workers = count_of(processes)
     with ExitStack() as stack:
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         store = stack.enter_context(kept(out, "limits"))
         with steps() as progress:
             start = starting_gait(gait, preset, set_, None, progress)

@@ -8,7 +8,7 @@ import shlex
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -50,6 +50,13 @@ class ResultDirectory:
             raise OutputError(
                 f"cannot write to '{path}' ({failure.strerror})", "give --out another directory"
             ) from None
+
+    @classmethod
+    def within(
+        cls, stack: ExitStack, path: Path | None, *, films: bool = False
+    ) -> ResultDirectory | None:
+        """Enter one until the stack is left, if a place is given."""
+        return None if path is None else stack.enter_context(cls(path, films=films))
 
     @contextmanager
     def stage(self, replaced: re.Pattern[str] | None = None) -> Iterator[Path]:

@@ -107,7 +107,7 @@ def robustness(
             check_between(option, value, 0, inf)
     workers = count_of(processes)
     with ExitStack() as stack:
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         store = stack.enter_context(kept(out, kind))
         with steps() as progress:
             progress.begin("looking for gaits")

@@ -83,11 +83,7 @@ def run3d(
     walker = walker_of(robot, gait, set_, lock=locked, plane=plane)
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = (
-            None
-            if out is None
-            else stack.enter_context(ResultDirectory(out, films=animation or render))
-        )
+        directory = ResultDirectory.within(stack, out, films=animation or render)
         progress.begin("walking")
         run = run_in_space(
             walker.robot, walker.walk, seconds,

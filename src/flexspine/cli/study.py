@@ -104,7 +104,7 @@ def study(
     damped = DampedSetting(dampings=tuple(damping or DampedSetting().dampings))
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         store = None if out is None else out / UNFINISHED
         begun = store is not None and store.exists()
         if store is not None:

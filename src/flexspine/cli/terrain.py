@@ -118,9 +118,7 @@ def terrain(
         if not passive:
             progress.begin("designing the feedback")
             found = steering = stabilizer_of(start, steer, method, once, effort)
-        directory = (
-            None if out is None else stack.enter_context(ResultDirectory(out, films=animation))
-        )
+        directory = ResultDirectory.within(stack, out, films=animation)
         progress.begin("running")
         run = walk_over(
             start.model, steering, where, stride=start.stride_length, strides=strides, seed=seed

@@ -130,11 +130,7 @@ def trot(
     )
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = (
-            None
-            if out is None
-            else stack.enter_context(ResultDirectory(out, films=animation and not compare))
-        )
+        directory = ResultDirectory.within(stack, out, films=animation and not compare)
         if compare:
             _refuse_besides_compare(
                 {

@@ -86,7 +86,7 @@ def pinned(
     interruptible()
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         check = check_pinned(
             load_robot(robot, numbers("--set", set_)),
             foot,

@@ -69,7 +69,7 @@ def engines(
     with ExitStack() as stack:
         progress = stack.enter_context(steps())
         body, animal = load_robot(robot), load_model(DEFAULT_PRESET if preset is None else preset)
-        directory = None if out is None else stack.enter_context(ResultDirectory(out))
+        directory = ResultDirectory.within(stack, out)
         template = check_template(animal, progress=lambda w: progress.begin(f"bounder: {w}"))
         replay = check_replay(
             body, seconds=seconds, progress=lambda w: progress.begin(f"trot: {w}")

@@ -15,7 +15,7 @@ from PIL import Image
 
 from flexspine.errors import ParameterError
 from flexspine.report.caption import ending, heading
-from flexspine.report.film import write_film
+from flexspine.report.film import is_gif, write_film
 from flexspine.report.picture import Picture
 from flexspine.report.postures import Posture, postures
 from flexspine.report.robot_scene import RobotScene
@@ -90,7 +90,7 @@ def animate(
         scene.figure.set_dpi(DOTS)
         write_film(
             _pictures(scene, scene.postures), files, fps=fps, count=len(times),
-            colors=_colors(scene), progress=progress,
+            colors=_colors(scene) if any(map(is_gif, files)) else None, progress=progress,
         )  # fmt: skip
 
 

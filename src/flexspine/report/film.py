@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 QUALITY = 20  # x264's constant rate factor; 18 looks as it was drawn, each 6 halves the file
 
 
+def is_gif(path: Path) -> bool:
+    """Tell a GIF from other films by its name."""
+    return path.suffix.lower() == ".gif"
+
+
 class _Film(Protocol):
     """A film that is being made."""
 
@@ -63,8 +68,8 @@ def write_film(
         with ExitStack() as made:
             for part in parts.values():
                 part.touch()
-                video = part.suffix == ".mp4"
-                films.append(_Video(part, fps) if video else _Gif(part, fps, gif_every, colors))
+                gif = _Gif(part, fps, gif_every, colors) if is_gif(part) else None
+                films.append(gif or _Video(part, fps))
                 made.callback(films[-1].abandon)
             for number, picture in enumerate(pictures, start=1):
                 for film in films:
@@ -126,27 +131,34 @@ class _Video:
         try:
             self._process.stdin.write(picture.tobytes())
         except BrokenPipeError:
-            self.close()
+            self._process.wait()
+            raise self._failure() from None
 
     def close(self) -> None:
-        if self._process is None:
-            return
-        assert self._process.stdin is not None
-        with suppress(BrokenPipeError):
-            self._process.stdin.close()
-        if self._process.wait() == 0:
-            return
-        self._said.seek(0)
-        said = self._said.read().decode(errors="replace").strip() or "it does not say why"
-        raise MachineError(
-            f"the video encoder failed ({said.splitlines()[-1]})", "write a .gif instead"
-        )
+        if self._process is not None:
+            self._let_go(self._process)
+            if self._process.wait():
+                raise self._failure()
 
     def abandon(self) -> None:
         if self._process is not None:
             self._process.kill()
+            self._let_go(self._process)
             self._process.wait()
         self._said.close()
+
+    def _let_go(self, process: subprocess.Popen[bytes]) -> None:
+        """Tell the encoder that nothing more will come."""
+        assert process.stdin is not None
+        with suppress(BrokenPipeError):
+            process.stdin.close()
+
+    def _failure(self) -> MachineError:
+        self._said.seek(0)
+        said = self._said.read().decode(errors="replace").strip() or "it does not say why"
+        return MachineError(
+            f"the video encoder failed ({said.splitlines()[-1]})", "write a .gif instead"
+        )
 
     def _start(self, height: int, width: int) -> subprocess.Popen[bytes]:
         taken = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {self._fps} -i -"
