@@ -9,7 +9,7 @@ SITE := docs/conf.py docs/_sphinx docs/own
 # Commands that tests start would else compile what they import, each anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test docs coverage bench pictures clean
+.PHONY: run test suite site docs coverage bench pictures clean
 
 run: $(VENV)/.installed
 	@echo "The published study, some minutes:"
@@ -21,8 +21,15 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check src tests benchmarks examples $(SITE)
 	$(BIN)/mypy --num-workers auto
 	$(BIN)/lint-imports
+	$(MAKE) --jobs 2 --no-print-directory suite site  # alone, either leaves cores idle at times
+
+suite: $(VENV)/.installed-dev
 	$(BIN)/pytest -n auto --dist loadfile
-	FLEXSPINE_OPTIMIZATION=0 FLEXSPINE_CACHE_DIR=$(CURDIR)/.pytest_cache/d/compiled $(MAKE) docs  # much is compiled there
+
+# With the compiled code of the tests.
+site: export FLEXSPINE_OPTIMIZATION := 0
+site: export FLEXSPINE_CACHE_DIR := $(CURDIR)/.pytest_cache/d/compiled
+site: docs
 
 # Runs its examples and pages of code; fails on any warning, such as a broken link.
 docs: $(VENV)/.installed-dev

@@ -16,6 +16,9 @@ from sybil.parsers.markdown import PythonCodeBlockParser, SkipParser
 
 HERE = Path(__file__).parent
 
+# The site is made there, in `make test` at the same time.
+collect_ignore = ["docs/_build", "docs/gallery", "docs/reference"]
+
 
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:

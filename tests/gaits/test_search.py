@@ -67,7 +67,7 @@ def gaits(published_search: Search) -> list[Found]:
 
 def flexible_search(stiffness: float, speed: float) -> Search:
     fixed = {**SETTING, "mean_speed": speed}
-    return find_gaits(flexible_at(stiffness), fixed, symmetric=True, starts=60)
+    return find_gaits(flexible_at(stiffness), fixed, symmetric=True, starts=40)
 
 
 def second_run(gait: Gait, body: reference.Flexible) -> reference.Result:
@@ -277,7 +277,7 @@ def test_no_orbit_is_found_twice_where_both_its_apexes_solve_the_equations(name:
 
     def search(low: float, high: float) -> Search:
         bounds = {"height": (low, high)}
-        return find_gaits(load_model(name), fixed, symmetric=True, starts=100, bounds=bounds)
+        return find_gaits(load_model(name), fixed, symmetric=True, starts=60, bounds=bounds)
 
     (lower,) = published(search(0.31, 0.33))
     top = other_apex(lower).apex["height"]

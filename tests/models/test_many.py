@@ -7,7 +7,7 @@ from flexspine import Model, load_model, simulate, simulate_many, stream_many, s
 from flexspine.errors import InputError, StateError
 from flexspine.models.legs import SIDES
 
-RUNS, STRIDES, SPREAD = 70, 3, 0.03
+RUNS, STRIDES, SPREAD = 45, 3, 0.03
 
 
 def scattered(model: Model, runs: int = RUNS) -> dict[str, np.ndarray]:
