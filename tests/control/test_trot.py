@@ -30,6 +30,7 @@ ROBOT = load_robot("sc618")
 LINKAGE = ROBOT.linkage
 LOCKED = locked(ROBOT, "spine")
 PUSHED_AT = 3.1
+TICKS = 640  # of a clock, 400 times a second
 
 
 @cache
@@ -40,22 +41,22 @@ def tracking(speed: float = 0.3) -> RobotRun:
 
 @cache
 def pushed() -> RobotRun:
-    return trot(ROBOT, Trot(seconds=6.0, push=1.0, push_time=PUSHED_AT))
+    return trot(ROBOT, Trot(seconds=4.6, push=1.0, push_time=PUSHED_AT))
 
 
 @cache
 def sampled() -> RobotRun:
-    return trot(ROBOT, Trot(seconds=3.0, rate=400.0))
+    return trot(ROBOT, Trot(seconds=TICKS / 400, rate=400.0))
 
 
 @cache
 def limited() -> RobotRun:
-    return trot(ROBOT, Trot(seconds=3.0, rate=400.0, limit=16.0))
+    return trot(ROBOT, Trot(seconds=TICKS / 400, rate=400.0, limit=15.0))
 
 
 @cache
 def springs() -> RobotRun:
-    return trot(ROBOT, Trot(seconds=4.5, controller="pd"))
+    return trot(ROBOT, Trot(seconds=3.8, controller="pd"))
 
 
 @cache
@@ -158,7 +159,7 @@ def test_the_steady_speed_is_what_was_asked_for(speed: float) -> None:
 
 
 def test_the_same_walk_is_the_same_to_the_last_bit() -> None:
-    one, other = (trot(ROBOT, Trot(seconds=3.0)).trajectory for _ in range(2))
+    one, other = (trot(ROBOT, Trot(seconds=1.2)).trajectory for _ in range(2))
     assert one.end.states.tobytes() == other.end.states.tobytes()
     assert [e.time for e in one.events] == [e.time for e in other.events]
 
@@ -363,7 +364,7 @@ def test_errors_fade_as_a_critically_damped_spring_would_have_it(
         expected = (error[0] + (rate[0] + 20 * error[0]) * t) * np.exp(-20 * t)
         assert error == pytest.approx(expected, abs=1e-10)
         count, largest = count + 1, max(largest, float(np.abs(error).max()))
-    assert count >= (50 if make is tracking else 14)
+    assert count >= (50 if make is tracking else 10)
     assert largest > (1e-5 if make is tracking else 1e-3)
 
 
@@ -482,9 +483,9 @@ def test_the_guard_of_a_straight_line_is_the_area_between_feet_and_spine() -> No
 @pytest.mark.parametrize("make", [sampled, limited])
 def test_torques_change_at_ticks_of_the_clock_only(make: Callable[[], RobotRun]) -> None:
     """Four times between every two ticks of 2.5 ms."""
-    ticks = np.arange(1200)[:, None] / 400
+    ticks = np.arange(TICKS)[:, None] / 400
     times = (ticks + np.array([2e-5, 0.8e-3, 1.6e-3, 2.48e-3])).ravel()
-    torque = robot_dataset(make(), times=times)["torque"].values.reshape(1200, 4, 8)
+    torque = robot_dataset(make(), times=times)["torque"].values.reshape(TICKS, 4, 8)
     assert (torque == torque[:, :1]).all()
     changed = np.abs(np.diff(torque[:, 0], axis=0)).max(axis=1) > 0
     assert changed.mean() > 0.99
@@ -499,8 +500,8 @@ def test_sampled_joints_stay_close_to_what_they_are_asked_for() -> None:
 
 def test_limits_of_torques_are_never_exceeded_and_reached() -> None:
     torque = dataset(limited)["torque"].values
-    assert np.abs(dataset(sampled)["torque"].values).max() > 16
-    assert np.abs(torque).max() == 16.0
+    assert np.abs(dataset(sampled)["torque"].values).max() > 15
+    assert np.abs(torque).max() == 15.0
 
 
 def test_a_slow_clock_shakes_stiff_joints_out_of_control() -> None:

@@ -35,12 +35,12 @@ def tracking() -> RobotRun:
 @cache
 def springs() -> RobotRun:
     """Feet slide now and then."""
-    return trot(ROBOT, Trot(seconds=6.0, controller="pd"))
+    return trot(ROBOT, Trot(seconds=4.4, controller="pd"))
 
 
 @cache
 def pushed() -> RobotRun:
-    return trot(ROBOT, Trot(seconds=6.0, push=1.0, push_time=3.1))
+    return trot(ROBOT, Trot(seconds=4.6, push=1.0, push_time=3.1))
 
 
 RUNS = {"tracking": tracking, "springs": springs, "pushed": pushed}
@@ -57,7 +57,7 @@ def summary(make: Make) -> WalkSummary:
 @cache
 def data(make: Make) -> xr.Dataset:
     """At other times than every millisecond."""
-    times = np.linspace(0, make().trajectory.duration, 15013)
+    times = np.linspace(0, make().trajectory.duration, 9013)
     return robot_dataset(make(), times=times)
 
 

@@ -54,7 +54,7 @@ class Compiled:
         lower = Lowering(known, tuple(motion.values), definitions, 0)
         outputs = [lower(each) for each in (*accelerations, *forces)]
         self.function = hy.cfunc(outputs, vars=variables)
-        self.numbers = np.array([float(c.subs(motion.values)) for c in lower.coefficients])
+        self.numbers = np.array([float(c.xreplace(motion.values)) for c in lower.coefficients])
         self.size = linkage.size
 
     def __call__(self, *states: Array) -> tuple[Array, Array]:
@@ -222,7 +222,7 @@ def test_a_robot_pinned_by_one_foot_keeps_its_energy_and_its_foot() -> None:
         [*absolute(linkage, q), *np.zeros(12)],
         tol=1e-12,
         compact_mode=True,
-        pars=[float(c.subs(motion.values)) for c in lower.coefficients],
+        pars=[float(c.xreplace(motion.values)) for c in lower.coefficients],
     )
     relative = np.linalg.inv(np.array([absolute(linkage, row) for row in np.eye(12)]).T)
     start = float(linkage.potential_energy(q))

@@ -32,7 +32,7 @@ def test_the_robot_follows_as_in_numbers(feet: list[str]) -> None:
     outputs += [part for name in feet for part in found.forces[name]]
     outputs += [] if found.closeness is None else [found.closeness]
     function = hy.cfunc([lower(each) for each in outputs], vars=variables, compact_mode=True)
-    numbers = np.array([float(c.subs(motion.values)) for c in lower.coefficients])
+    numbers = np.array([float(c.xreplace(motion.values)) for c in lower.coefficients])
     rng = np.random.default_rng(3)
     to = ROBOT.to_absolute
     for _ in range(50):

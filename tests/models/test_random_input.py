@@ -81,7 +81,7 @@ def check(preset: str, changes: dict[str, Any], apex: dict[str, float], angles: 
         assert np.all(np.isfinite(run.trajectory.end.states))
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(sane())
 def test_sane_bounders_always_end_in_an_outcome(
     case: tuple[str, dict[str, Any], dict[str, float], dict[str, float]],
@@ -89,7 +89,7 @@ def test_sane_bounders_always_end_in_an_outcome(
     check(*case)
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(st.data())
 def test_any_numbers_at_all_end_in_an_outcome_or_one_error(data: st.DataObject) -> None:
     """Within the bounds that the parameters declare, and beyond them."""
@@ -119,7 +119,7 @@ def test_actuated_bounders_end_in_an_outcome_or_one_error(
     check(preset, {**changes, **{n: data.draw(number) for n in names}}, apex, touchdown)
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(
     st.dictionaries(
         st.sampled_from(("com_y", "com_x_rate", "com_y_rate", "fore_pitch", "hind_pitch_rate")),
