@@ -545,7 +545,7 @@ FILES = st.builds(
 
 
 @given(content=FILES | st.dictionaries(TEXTS, ANYTHING, max_size=3))
-@settings(max_examples=150, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, suppress_health_check=list(HealthCheck))
 def test_any_file_is_a_plan_or_is_refused(
     tmp_path_factory: pytest.TempPathFactory, content: dict[str, Any]
 ) -> None:
