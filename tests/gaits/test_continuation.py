@@ -269,14 +269,25 @@ def test_where_the_order_of_contacts_changes_two_of_them_coincide(
     assert "DF-FS-DF-HS-DF becomes DF-FS-DS-HS-DF" in mark.detail
 
 
-@pytest.mark.parametrize("share", [0.1, 0.4, 0.8])
+SHARES = [0.1, 0.4, 0.8, 0.97]
+
+
+@pytest.fixture(scope="module")
+def others(branches: dict[str, Branch]) -> dict[float, Branch]:
+    """One branch, traced from the gaits that are these shares of it away from its beginning."""
+    points = branches["260"].points
+    return {
+        share: trace_branch(points[int(share * len(points))].gait, bounds=SPEEDS)
+        for share in SHARES
+    }
+
+
+@pytest.mark.parametrize("share", SHARES[:-1])
 def test_a_branch_is_the_same_curve_from_whichever_of_its_gaits_it_is_traced(
-    share: float, branches: dict[str, Branch]
+    share: float, branches: dict[str, Branch], others: dict[float, Branch]
 ) -> None:
     """One trace goes backward where the other goes forward; their steps differ."""
-    branch = branches["260"]
-    start = branch.points[int(share * len(branch.points))].gait
-    other = trace_branch(start, bounds=SPEEDS)
+    branch, other = branches["260"], others[share]
     for value in (3.8, 4.1, 4.4, 4.49, 4.52, 4.56, 4.57):
         here, there = (
             sorted([*p.gait.model.apex.values(), *p.gait.model.touchdown.values()] for p in found)
@@ -289,12 +300,11 @@ def test_a_branch_is_the_same_curve_from_whichever_of_its_gaits_it_is_traced(
         assert only(other, kind).value == pytest.approx(only(branch, kind).value, abs=slack)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.4, 0.8, 0.97])
+@pytest.mark.parametrize("share", SHARES)
 def test_a_branch_has_the_same_ends_from_whichever_of_its_gaits_it_is_traced(
-    share: float, branches: dict[str, Branch]
+    share: float, branches: dict[str, Branch], others: dict[float, Branch]
 ) -> None:
-    branch = branches["260"]
-    other = trace_branch(branch.points[int(share * len(branch.points))].gait, bounds=SPEEDS)
+    branch, other = branches["260"], others[share]
     found = sorted((mark.value, mark.kind) for mark in (other.landmarks[0], other.landmarks[-1]))
     known = sorted((mark.value, mark.kind) for mark in (branch.landmarks[0], branch.landmarks[-1]))
     assert [kind for _, kind in found] == [kind for _, kind in known]

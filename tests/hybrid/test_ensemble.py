@@ -328,15 +328,20 @@ def mixed() -> Starts:
     return drops(height, np.where(rng.random(61) < 0.3, 0.3, rng.uniform(0.9, 1, 61)))
 
 
+@pytest.fixture(scope="module")
+def whole(mixed: Starts) -> Ends:
+    return many(ball(), mixed, 12)
+
+
 @pytest.mark.parametrize("pool", [1, 2, 7, 16, 33, 60])
-def test_runs_do_not_depend_on_the_size_of_the_pool(mixed: Starts, pool: int) -> None:
-    whole = many(ball(), mixed, 12)
+def test_runs_do_not_depend_on_the_size_of_the_pool(mixed: Starts, whole: Ends, pool: int) -> None:
     assert set(names(whole)) == {"completed", "chattered", NEVER.name}
     assert_same_bits(many(ball(), mixed, 12, pool=pool), whole, slice(None))
 
 
-def test_runs_do_not_depend_on_their_neighbours_nor_on_their_order(mixed: Starts) -> None:
-    whole = many(ball(), mixed, 12)
+def test_runs_do_not_depend_on_their_neighbours_nor_on_their_order(
+    mixed: Starts, whole: Ends
+) -> None:
     for rows in (slice(0, 5), slice(3, 4), slice(10, 60, 7), slice(None, None, -1)):
         assert_same_bits(many(ball(), taken(mixed, rows), 12), whole, rows)
     order = np.random.default_rng(4).permutation(len(mixed))
