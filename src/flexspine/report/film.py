@@ -68,8 +68,9 @@ def write_film(
         with ExitStack() as made:
             for part in parts.values():
                 part.touch()
-                gif = _Gif(part, fps, gif_every, colors) if is_gif(part) else None
-                films.append(gif or _Video(part, fps))
+                films.append(
+                    _Gif(part, fps, gif_every, colors) if is_gif(part) else _Video(part, fps)
+                )
                 made.callback(films[-1].abandon)
             for number, picture in enumerate(pictures, start=1):
                 for film in films:
