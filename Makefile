@@ -9,19 +9,25 @@ SITE := docs/conf.py docs/_sphinx docs/own
 # Commands that tests start would else compile what they import, each anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test suite site docs coverage bench pictures clean
+.PHONY: run test check suite site docs coverage bench pictures clean
 
 run: $(VENV)/.installed
 	@echo "The published study, some minutes:"
 	$(BIN)/flexspine study --out $(OUT)
 	@echo "Look at $(OUT)/verdicts.md and $(OUT)/peak_grf_over_speed.png"
 
-test: $(VENV)/.installed-dev
+# Two at once, as neither keeps two cores busy alone.
+test: $(VENV)/.installed-check
+	$(MAKE) --jobs 2 --no-print-directory check $(VENV)/.installed-dev
+	$(MAKE) --jobs 2 --no-print-directory suite site
+
+# flexspine itself is installed anew meanwhile.
+check: export PYTHONPATH := src
+check: $(VENV)/.installed-check
 	$(BIN)/ruff check src tests benchmarks examples $(SITE)
 	$(BIN)/ruff format --check src tests benchmarks examples $(SITE)
 	$(BIN)/mypy --num-workers auto
 	$(BIN)/lint-imports
-	$(MAKE) --jobs 2 --no-print-directory suite site  # alone, either leaves cores idle at times
 
 suite: $(VENV)/.installed-dev
 	$(BIN)/pytest -n auto --dist loadfile
@@ -67,8 +73,13 @@ $(VENV)/.installed: $(VENV)/bin/python pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable '.[engine]'
 	touch $@
 
-$(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'  # what is never imported need not be compiled
+# What is never imported need not be compiled.
+$(VENV)/.installed-check: $(VENV)/bin/python pyproject.toml
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[check]'
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed-check
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'
 	touch $@ $(VENV)/.installed
 
 clean:
