@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+import gc
 import os
 from pathlib import Path
 
@@ -28,6 +29,11 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     os.environ["FLEXSPINE_CACHE_DIR"] = str(config.cache.mkdir("compiled"))
     os.environ.setdefault("FLEXSPINE_OPTIMIZATION", "0")
+
+
+def pytest_collection_finish() -> None:
+    """What is imported stays: no search for garbage need go through it again."""
+    gc.freeze()
 
 
 def reference_rows(name: str) -> list[list[str]]:

@@ -107,13 +107,13 @@ def test_a_foot_that_stands_goes_back_by_its_stride_at_constant_speed() -> None:
 
 
 def test_the_robot_steps_by_the_rhythm_and_stops() -> None:
-    run = trot(ROBOT, Trot(seconds=2.2, controller="cpg", gait=Pace(stop=1.0)))
+    run = trot(ROBOT, Trot(seconds=1.9, controller="cpg", gait=Pace(stop=0.9)))
     assert run.outcome.completed
     data = robot_dataset(run)
     x, times = data["com"].values[:, 0], data["time"].values
-    going = (x[times <= 1.0][-1] - x[times <= 0.5][-1]) / 0.5
+    going = (x[times <= 0.9][-1] - x[times <= 0.5][-1]) / 0.4
     assert 0.15 < going < 0.35
-    assert abs(x[-1] - x[times <= 2.0][-1]) < 0.01
+    assert abs(x[-1] - x[times <= 1.7][-1]) < 0.01
     swings = data["reference"].values
     assert np.ptp(swings[times < 0.02], axis=0).max() < 0.02  # a smooth start
     assert summarize_walk(run).imbalance < 1e-8

@@ -516,10 +516,10 @@ def test_a_slow_clock_shakes_stiff_joints_out_of_control() -> None:
 @pytest.mark.parametrize("controller", ["com", "pd"])
 def test_it_trots_with_a_flexible_and_a_locked_spine(controller: str, body: str) -> None:
     robot = ROBOT if body == "flexible" else LOCKED
-    asked = Trot(seconds=3.2, controller=controller)
+    asked = Trot(seconds=2.4, controller=controller)
     run = springs() if (controller, body) == ("pd", "flexible") else trot(robot, asked)
     assert run.outcome.completed, run.outcome
-    data = robot_dataset(run, times=np.linspace(0, 3.2, 321))
+    data = robot_dataset(run, times=np.linspace(0, 2.4, 241))
     assert data["com"].values[:, 1].min() > 0.29
     late = data["time"].values > 1.6
     speed = np.polyfit(data["time"].values[late], data["com"].values[late, 0], 1)[0]

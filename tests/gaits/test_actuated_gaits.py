@@ -75,7 +75,7 @@ def test_such_gaits_close_in_the_second_implementation_and_gain_what_they_lose(
 def test_a_gait_is_found_from_an_actuator_that_works_already(damped: Search) -> None:
     """The range may begin at nothing all the same: a length is no scale."""
     model = animal(**{"spine.damping": 1.0, "legs.extension": 0.005})
-    found = find_gaits(model, SETTING, free={"legs.extension": RANGE})
+    found = find_gaits(model, SETTING, free={"legs.extension": RANGE}, starts=50)
     gait, expected = published_like(found), published_like(damped)
     assert gait.model.touchdown == pytest.approx(expected.model.touchdown, abs=CLOSED)
     numbers, known = gait.model.numbers, expected.model.numbers
