@@ -32,16 +32,15 @@ check: $(VENV)/.installed-check
 suite: $(VENV)/.installed-dev
 	$(BIN)/pytest -n auto --dist loadfile
 
-# With the compiled code of the tests, which come first: what they have compiled is there by then.
-site: BEHIND := nice -n 5
+# With the compiled code of the tests.
 site: export FLEXSPINE_OPTIMIZATION := 0
 site: export FLEXSPINE_CACHE_DIR := $(CURDIR)/.pytest_cache/d/compiled
 site: docs
 
 # Runs its examples and pages of code; fails on any warning, such as a broken link.
 docs: $(VENV)/.installed-dev
-	$(BEHIND) $(BIN)/sphinx-build -j auto -W --keep-going -q -b html -d docs/_build/read docs docs/_build/html
-	$(BEHIND) $(BIN)/sphinx-build -j auto -W --keep-going -q -b doctest -d docs/_build/read docs docs/_build/doctest
+	$(BIN)/sphinx-build -j auto -W --keep-going -q -b html -d docs/_build/read docs docs/_build/html
+	$(BIN)/sphinx-build -j auto -W --keep-going -q -b doctest -d docs/_build/read docs docs/_build/doctest
 	@echo "Open docs/_build/html/index.html"
 
 # How much of the library the tests run, by line and branch; takes half as long again as they do.
